@@ -1,6 +1,7 @@
 //! A scenario made of a capture: what the master sent is sent again at its time, and what slaves sent is expected.
 
 use super::judge::judge;
+use crate::value::hex;
 use harness_bench::capture::JudgedFrames;
 use harness_bench::capture::runs::rate;
 use harness_bench::capture::runs::{TelegramRun, octets, runs};
@@ -14,11 +15,6 @@ use harness_proto::time::Span;
 use harness_sim::record::{LineByte, Trace};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-
-fn hex(octets: &[u8]) -> String {
-    let digits: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
-    digits.join(" ")
-}
 
 /// A scenario that replays a capture: what the master sent is sent again at its time, and what slaves sent is expected. `setup` describes
 /// the slaves: its lines `slave` and `rate` become the header; without it, slaves are those that sent, with the PPO type that the last
@@ -92,10 +88,10 @@ pub(crate) fn judged(
         all.remarks.extend(judged.doubts);
         all.remarks.extend(judged.remarks);
         let breaches = judged.breaches.into_iter();
-        all.differences.extend(breaches.map(|own| {
+        all.differences.extend(breaches.map(|breach| {
             format!(
                 "telegram {}, slave {}: {} (NORDAC {})",
-                own.telegram, own.slave, own.about, own.section
+                breach.telegram, breach.slave, breach.about, breach.section
             )
         }));
     }
@@ -120,14 +116,14 @@ fn slaves(runs: &[TelegramRun]) -> Result<BTreeMap<u8, Option<PpoType>>, String>
         );
     }
     for run in runs.iter().filter(|run| run.from.is_none()) {
-        let Some(Telegram::Pdu(pdu)) = run.said().and_then(|own| own.telegram()) else {
+        let Some(Telegram::Pdu(pdu)) = run.said().and_then(|said| said.telegram()) else {
             continue;
         };
         let ppo = PpoType::from_cfg(pdu.data());
         if Service::of(pdu.dsap()) == Some(Service::ChkCfg)
-            && let (Some(own), Some(ppo)) = (slaves.get_mut(&pdu.da()), ppo)
+            && let (Some(slave), Some(ppo)) = (slaves.get_mut(&pdu.da()), ppo)
         {
-            *own = Some(ppo);
+            *slave = Some(ppo);
         }
     }
     Ok(slaves)
@@ -136,13 +132,13 @@ fn slaves(runs: &[TelegramRun]) -> Result<BTreeMap<u8, Option<PpoType>>, String>
 /// What happened to octets between their sender and the other stations.
 fn faults(trace: &Trace, text: &mut String) {
     let mut sent: BTreeMap<Option<u8>, usize> = BTreeMap::new();
-    for (from, own) in octets(trace) {
-        if own.sent.is_none() {
+    for (from, octet) in octets(trace) {
+        if octet.sent.is_none() {
             continue;
         }
         let number = sent.entry(from).or_default();
         *number += 1;
-        let Some(fault) = fault(&own) else {
+        let Some(fault) = fault(&octet) else {
             continue;
         };
         let sender = from.map_or("master".to_owned(), |slave| format!("slave {slave}"));
@@ -151,20 +147,20 @@ fn faults(trace: &Trace, text: &mut String) {
 }
 
 /// The fault that makes an octet arrive as it did; `None` where there is none, or where the language has none.
-fn fault(own: &LineByte) -> Option<String> {
-    match (own.received, own.error) {
+fn fault(octet: &LineByte) -> Option<String> {
+    match (octet.received, octet.error) {
         (None, _) => Some("drop".to_owned()),
-        (_, Some(LineError::Parity)) if own.sent == own.received => Some("flip p".to_owned()),
-        (_, Some(LineError::Framing)) if own.sent == own.received => Some("flip s".to_owned()),
+        (_, Some(LineError::Parity)) if octet.sent == octet.received => Some("flip p".to_owned()),
+        (_, Some(LineError::Framing)) if octet.sent == octet.received => Some("flip s".to_owned()),
         (Some(received), Some(LineError::Parity)) => {
-            let bits = own.sent? ^ received;
+            let bits = octet.sent? ^ received;
             let bits: Vec<_> = (0..8)
                 .filter(|bit| bits >> bit & 1 == 1)
                 .map(|bit: u8| bit.to_string())
                 .collect();
             Some(format!("flip {}", bits.join(" ")))
         }
-        (Some(received), None) if own.sent != own.received => {
+        (Some(received), None) if octet.sent != octet.received => {
             Some(format!("replace {received:02X}"))
         }
         _ => None,
@@ -177,7 +173,7 @@ fn step(run: &TelegramRun, octet: Span, text: &mut String) {
             let Some(first) = run.octets.first() else {
                 return;
             };
-            let sent: Vec<u8> = run.octets.iter().filter_map(|own| own.sent).collect();
+            let sent: Vec<u8> = run.octets.iter().filter_map(|octet| octet.sent).collect();
             let nanos = (first.at - octet).since_start().as_nanos();
             writeln!(
                 text,

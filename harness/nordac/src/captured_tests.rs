@@ -14,7 +14,7 @@ const SLAVE: u8 = 5;
 fn telegram(da: u8, sa: u8, fc: u8, saps: &[u8], data: &[u8]) -> Vec<u8> {
     let ext = if saps.is_empty() { 0 } else { 0x80 };
     let body = [&[da | ext, sa | ext, fc], saps, data].concat();
-    let sum = body.iter().fold(0_u8, |sum, own| sum.wrapping_add(*own));
+    let sum = body.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
     let length = u8::try_from(body.len()).expect("short");
     [&[0x68, length, length, 0x68][..], &body, &[sum, 0x16]].concat()
 }
@@ -138,7 +138,7 @@ pub(super) fn settings(links: &[&str]) -> ReadSettings {
     ReadSettings {
         links: links
             .iter()
-            .map(|own| own.parse().expect("a link"))
+            .map(|link| link.parse().expect("a link"))
             .collect(),
         ..ReadSettings::default()
     }
@@ -200,7 +200,9 @@ fn octets_stand_behind_any_event() {
 fn the_user_says_what_an_interface_is() {
     let packets = |interface: usize| -> Vec<(usize, u64, Vec<u8>)> {
         let packets = serial(0x02, &timed(&start())).into_iter();
-        packets.map(|own| (interface, own.0, own.1)).collect()
+        packets
+            .map(|(at, packet)| (interface, at, packet))
+            .collect()
     };
     for (names, link) in [
         (&[""][..], "bus"),
@@ -242,7 +244,7 @@ fn the_user_says_what_an_interface_is() {
         "two interfaces are named \"bus\"",
     );
     let behind = packets(0).into_iter().enumerate();
-    let behind = behind.map(|(place, own)| (place / 6, own.1, own.2));
+    let behind = behind.map(|(place, packet)| (place / 6, packet.1, packet.2));
     assert_eq!(
         verdict(&pcapng(&["bus", "bus"], &behind.collect::<Vec<_>>()), &[]),
         PASSED
@@ -299,7 +301,7 @@ fn cooked_captures_of_can() {
             .frames()
             .iter()
             .collect();
-        let shown: Vec<_> = frames.iter().map(|own| own.frame.to_string()).collect();
+        let shown: Vec<_> = frames.iter().map(|frame| frame.frame.to_string()).collect();
         assert_eq!(
             shown,
             ["201#3D1B00", "181#1B010000", "00000201#"],
@@ -330,7 +332,7 @@ fn cooked_captures_of_can() {
 fn pieces(octets: &[u8], size: usize) -> Vec<(u64, Vec<u8>)> {
     let pieces = octets.chunks(size).zip(1..);
     pieces
-        .map(|(own, place)| (place * 16_000_000, own.to_vec()))
+        .map(|(octets, place)| (place * 16_000_000, octets.to_vec()))
         .collect()
 }
 
@@ -338,7 +340,7 @@ fn pieces(octets: &[u8], size: usize) -> Vec<(u64, Vec<u8>)> {
 fn pieces_of_an_adapter_are_joined() {
     let octets = timed(&start())
         .into_iter()
-        .flat_map(|own| own.1)
+        .flat_map(|telegram| telegram.1)
         .collect::<Vec<_>>();
     for size in 2..=octets.len() {
         let file = pcap(250, serial(0x04, &pieces(&octets, size)));
@@ -346,7 +348,7 @@ fn pieces_of_an_adapter_are_joined() {
     }
     // An octet is lost: what it belonged to was not compared, and nothing passes.
     // A short confirmation leaves nothing behind, as a slave that does not reply.
-    for lost in (0..octets.len()).filter(|own| octets[*own] != 0xE5) {
+    for lost in (0..octets.len()).filter(|octet| octets[*octet] != 0xE5) {
         let mut octets = octets.clone();
         octets.remove(lost);
         let file = pcap(250, serial(0x04, &pieces(&octets, 16)));
@@ -363,7 +365,7 @@ fn pieces_of_an_adapter_are_joined() {
     let mut near = pieces(&octets, 16);
     near.iter_mut()
         .zip(1..)
-        .for_each(|(own, place)| own.0 = place * 125_000);
+        .for_each(|(change, place)| change.0 = place * 125_000);
     for event in [0x02, 0x04] {
         assert_eq!(verdict(&pcap(250, serial(event, &near)), &["bus"]), PASSED);
     }

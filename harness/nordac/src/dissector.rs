@@ -39,7 +39,7 @@ pub(crate) fn dissector() -> String {
             rows(
                 Status::ALL
                     .iter()
-                    .map(|own| format!("[{}] = {:?}", own.code(), own.name())),
+                    .map(|status| format!("[{}] = {:?}", status.code(), status.name())),
             ),
         ),
         (
@@ -62,7 +62,7 @@ pub(crate) fn dissector() -> String {
             rows(
                 PkwError::PRINTED
                     .iter()
-                    .map(|own| format!("[{}] = {:?}", own.code(), own.about())),
+                    .map(|error| format!("[{}] = {:?}", error.code(), error.about())),
             ),
         ),
         ("PARAMETERS", rows(PARAMETERS.iter().map(parameter))),
@@ -71,7 +71,7 @@ pub(crate) fn dissector() -> String {
             rows(
                 REASONS
                     .iter()
-                    .map(|(name, own)| format!("{name} = {:?}", own.about())),
+                    .map(|(name, reason)| format!("{name} = {:?}", reason.about())),
             ),
         ),
         (
@@ -79,7 +79,7 @@ pub(crate) fn dissector() -> String {
             rows(
                 ERRORS
                     .iter()
-                    .map(|(own, event)| format!("[0x{event:02X}] = {:?}", own.name())),
+                    .map(|(error, event)| format!("[0x{event:02X}] = {:?}", error.name())),
             ),
         ),
     ];
@@ -90,76 +90,77 @@ pub(crate) fn dissector() -> String {
         })
 }
 
-/// Rows of a table.
 fn rows(rows: impl Iterator<Item = impl Display>) -> String {
     rows.map(|row| format!("    {row},\n")).collect()
 }
 
-fn service(own: &Service) -> String {
-    match own.sap() {
-        Some(sap) => format!("[{sap}] = {:?}", own.name()),
-        None => format!("none = {:?}", own.name()),
+fn service(service: &Service) -> String {
+    match service.sap() {
+        Some(sap) => format!("[{sap}] = {:?}", service.name()),
+        None => format!("none = {:?}", service.name()),
     }
 }
 
-fn function(own: &Function) -> String {
-    let kind = match own {
-        own if own.is_srd() => "srd",
-        own if own.is_sdn() => "sdn",
+fn function(function: &Function) -> String {
+    let kind = match (function.is_srd(), function.is_sdn()) {
+        (true, _) => "srd",
+        (_, true) => "sdn",
         _ => "other",
     };
-    format!("[{}] = {{ {:?}, {kind:?} }}", own.code(), own.name())
+    let (code, name) = (function.code(), function.name());
+    format!("[{code}] = {{ {name:?}, {kind:?} }}")
 }
 
 fn mask((mask, name): &(u8, &str)) -> String {
     format!("{{ 0x{mask:02X}, {name:?} }}")
 }
 
-fn bit(own: &WordBit) -> String {
-    format!("[{}] = {:?}", own.number, own.name)
+fn bit(bit: &WordBit) -> String {
+    format!("[{}] = {:?}", bit.number, bit.name)
 }
 
-fn state(own: State) -> String {
+fn state(state: State) -> String {
     let shared = State::ALL
         .iter()
-        .any(|other| *other != own && other.bits() == own.bits());
+        .any(|other| *other != state && other.bits() == state.bits());
     let quick = match shared {
-        true => format!(", {}", own == State::QuickStop),
+        true => format!(", {}", state == State::QuickStop),
         false => String::new(),
     };
-    format!("{{ {:?}, 0x{:02X}{quick} }}", own.short(), own.bits())
+    format!("{{ {:?}, 0x{:02X}{quick} }}", state.short(), state.bits())
 }
 
-fn ppo(own: PpoType) -> String {
-    let cfg = Buffer::of(own.cfg()).unwrap_or_default();
-    let (number, bytes, pkw) = (own.number(), own.octets(), own.has_pkw());
+fn ppo(ppo: PpoType) -> String {
+    let cfg = Buffer::of(ppo.cfg()).unwrap_or_default();
+    let (number, bytes, pkw) = (ppo.number(), ppo.octets(), ppo.has_pkw());
     format!("{{ {number}, \"{cfg}\", {bytes}, {pkw} }}")
 }
 
 fn task(ak: u8) -> String {
-    let own = Task::of(ak);
-    format!("[{ak}] = {{ {:?}, {} }}", own.name(), own.is_change())
+    let task = Task::of(ak);
+    format!("[{ak}] = {{ {:?}, {} }}", task.name(), task.is_change())
 }
 
-fn unit(own: Unit) -> String {
-    format!("{{ {}, {}, {:?} }}", own.step, own.places, own.name)
+fn unit(unit: Unit) -> String {
+    format!("{{ {}, {}, {:?} }}", unit.step, unit.places, unit.name)
 }
 
-fn parameter(own: &Parameter) -> String {
-    let other = (0..u16::from(own.count)).filter(|element| own.unit_of(*element) != own.unit);
+fn parameter(parameter: &Parameter) -> String {
+    let elements = 0..u16::from(parameter.count);
+    let other = elements.filter(|element| parameter.unit_of(*element) != parameter.unit);
     let other: Vec<_> = other
-        .map(|element| format!("[{element}] = {}", unit(own.unit_of(element))))
+        .map(|element| format!("[{element}] = {}", unit(parameter.unit_of(element))))
         .collect();
     let elements = match other.is_empty() {
         true => String::new(),
         false => format!(", {{ {} }}", other.join(", ")),
     };
-    let (long, signed) = (own.has(Flag::Long), own.is_signed());
+    let (long, signed) = (parameter.has(Flag::Long), parameter.is_signed());
     format!(
         "[{}] = {{ {:?}, {long}, {signed}, {}{elements} }}",
-        own.number,
-        own.name,
-        unit(own.unit)
+        parameter.number,
+        parameter.name,
+        unit(parameter.unit)
     )
 }
 
@@ -171,8 +172,8 @@ mod tests {
     fn every_table_is_in_it() {
         let text = dissector();
         assert!(!text.contains('@'), "a table is missing");
-        for own in &PARAMETERS {
-            assert!(text.contains(&parameter(own)), "{}", own.number);
+        for row in &PARAMETERS {
+            assert!(text.contains(&parameter(row)), "{}", row.number);
         }
         let rows = [
             "[1202] = { \"Accel. time\", false, false, { 5, 2, \"s\" } },",

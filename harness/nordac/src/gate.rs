@@ -180,8 +180,8 @@ pub(crate) fn guarded<L: Link>(
         Capability::Eeprom => limits.eeprom,
         _ => true,
     };
-    let own = inner.capabilities().iter().copied();
-    let capabilities = own.filter(has).collect();
+    let available = inner.capabilities().iter().copied();
+    let capabilities = available.filter(has).collect();
     let gate = LineGate::new(limits, rate.unwrap_or_default(), slaves, listen_only);
     Guarded::behind(inner, vec![Box::new(gate)], capabilities)
 }
@@ -197,11 +197,11 @@ pub(crate) trait GuardsSlaves {
 
 impl<L: Line> GuardsSlaves for Guarded<L> {
     fn slaves(&self) -> Option<&guard::Gate> {
-        self.gate::<LineGate>(0).map(|own| &own.gate)
+        self.gate::<LineGate>(0).map(|gate| &gate.gate)
     }
 
     fn slaves_mut(&mut self) -> Option<&mut guard::Gate> {
-        self.gate_mut::<LineGate>(0).map(|own| &mut own.gate)
+        self.gate_mut::<LineGate>(0).map(|gate| &mut gate.gate)
     }
 }
 
@@ -368,7 +368,7 @@ mod tests {
             prop_assert!(!drive.inverter().state().output_on());
             let setup = SlaveSetup::new(8).drive(BusRate::K500, Instant::START);
             for parameter in harness_proto::nordac::PARAMETERS.iter() {
-                let read = |own: &harness_sim::nordac::Drive| own.inverter().parameter(parameter, Default::default());
+                let read = |drive: &harness_sim::nordac::Drive| drive.inverter().parameter(parameter, Default::default());
                 if ![967, 968].contains(&parameter.number) {
                     prop_assert_eq!(read(drive), read(setup.drive()), "{}", parameter.number);
                 }

@@ -2,6 +2,7 @@
 
 use super::report::Reader;
 use super::serve::SegmentServer;
+use crate::value::hex;
 use harness_bench::capture::runs::{TelegramRun, runs};
 use harness_bench::counted::counted;
 use harness_bench::serve::{ControlAnswer, ServedBus};
@@ -96,12 +97,12 @@ pub(super) fn picture_of_port(slaves: &[u8]) -> LivePicture {
 /// A telegram that a bench with these slaves has sent or received.
 pub(super) fn at_port(run: &TelegramRun, slaves: &[u8], reader: &mut Reader) -> LiveRow {
     let place = run.from.map_or(0, |slave| {
-        let own = slaves.iter().position(|own| *own == slave);
-        own.map_or(0, |place| place + 1)
+        let found = slaves.iter().position(|address| *address == slave);
+        found.map_or(0, |place| place + 1)
     });
     let last = run.octets.last();
-    let at = last.map_or(String::new(), |own| own.at.to_string());
-    let whole = run.octets.iter().all(|own| own.error.is_none());
+    let at = last.map_or(String::new(), |octet| octet.at.to_string());
+    let whole = run.octets.iter().all(|octet| octet.error.is_none());
     arrow(run, (slaves, slaves.len() + 1), place, (whole, at), reader)
 }
 
@@ -114,15 +115,16 @@ fn arrow(
     reader: &mut Reader,
 ) -> LiveRow {
     let Some(said) = run.said() else {
-        let sent: Vec<_> = run.octets.iter().filter_map(|own| own.sent).collect();
+        let sent: Vec<_> = run.octets.iter().filter_map(|octet| octet.sent).collect();
         let words = format!("lost  [{}]", hex(&sent));
         return LiveRow::arrow(columns, (place, None), false, at, words);
     };
     let words = reader.read(&said);
+    let mut all = slaves.iter();
     let to = match (run.from, words.to) {
         // The confirmation names no station.
         (Some(_), _) => Some(0),
-        (None, Some(to)) => slaves.iter().position(|own| *own == to).map(|own| own + 1),
+        (None, Some(to)) => all.position(|slave| *slave == to).map(|place| place + 1),
         (None, None) => None,
     };
     let text = format!(
@@ -153,7 +155,7 @@ impl SegmentServer {
             .setup
             .slaves
             .iter()
-            .map(|own| own.address)
+            .map(|slave| slave.address)
             .collect()
     }
 
@@ -171,8 +173,8 @@ impl SegmentServer {
         for (place, channel) in channels.iter_mut().enumerate() {
             channel.from = u8::try_from(place).ok();
             let octets = self.bench.line().take_record(place);
-            if let Some(own) = channel.octets_mut() {
-                own.extend(octets);
+            if let Some(record) = channel.octets_mut() {
+                record.extend(octets);
             }
         }
         let mut runs = runs(&recorder.begun);
@@ -184,9 +186,9 @@ impl SegmentServer {
         recorder.runs += runs.len() as u64;
         for channel in &mut recorder.begun.channels {
             let from = channel.from;
-            if let Some(own) = channel.octets_mut() {
-                own.clear();
-                own.extend(
+            if let Some(record) = channel.octets_mut() {
+                record.clear();
+                record.extend(
                     begun
                         .iter()
                         .filter(|run| run.from == from)
@@ -204,7 +206,7 @@ impl SegmentServer {
             .begun
             .channels
             .iter()
-            .any(|own| !own.octets().is_empty());
+            .any(|channel| !channel.octets().is_empty());
         if line.is_busy() || begun {
             return None;
         }
@@ -219,16 +221,16 @@ impl SegmentServer {
         let place = usize::from(run.from.unwrap_or(0));
         let slave = place
             .checked_sub(1)
-            .and_then(|own| slaves.get(own))
+            .and_then(|place| slaves.get(place))
             .copied();
         let at = run
             .octets
             .last()
-            .map_or(String::new(), |own| own.at.to_string());
+            .map_or(String::new(), |octet| octet.at.to_string());
         let whole = run
             .octets
             .iter()
-            .all(|own| own.sent == own.received && own.error.is_none());
+            .all(|octet| octet.sent == octet.received && octet.error.is_none());
         let run = TelegramRun {
             from: slave,
             octets: run.octets.clone(),
@@ -242,8 +244,8 @@ impl SegmentServer {
             return Vec::new();
         };
         let (slave, inverter) = (drive.slave(), drive.inverter());
-        let frequency =
-            Parameter::of(1813).and_then(|own| inverter.parameter(own, Index::default()));
+        let frequency = Parameter::of(1813)
+            .and_then(|parameter| inverter.parameter(parameter, Index::default()));
         let [whole, tenths] = {
             let tenths = frequency.unwrap_or_default();
             [tenths / 10, tenths % 10]
@@ -279,17 +281,12 @@ pub(super) fn without_tokens<'r>(
             shown.push(row);
             continue;
         };
-        let fold = tokens.get(&master).map_or(0, |own| own.fold) + 1;
+        let fold = tokens.get(&master).map_or(0, |token| token.fold) + 1;
         let words = format!("token {master}\u{2192}{master}");
         tokens.insert(master, LiveRow { fold, words, ..row });
     }
     shown.extend(tokens.into_values());
     shown
-}
-
-fn hex(octets: &[u8]) -> String {
-    let octets: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
-    octets.join(" ")
 }
 
 impl LiveView for SegmentServer {
@@ -347,7 +344,7 @@ impl LiveView for SegmentServer {
             stations: self
                 .slaves()
                 .into_iter()
-                .map(|own| self.station(own))
+                .map(|address| self.station(address))
                 .collect(),
             ..LiveNews::default()
         };

@@ -15,7 +15,7 @@ pub(crate) const MANUAL: Manual = Manual {
 };
 
 fn open() -> Vec<Open> {
-    let own = PROPERTIES.iter().map(|property| Open {
+    let properties = PROPERTIES.iter().map(|property| Open {
         section: property.section,
         name: property.name,
         values: match property.accepts {
@@ -28,5 +28,5 @@ fn open() -> Vec<Open> {
         },
         about: property.about,
     });
-    own.collect()
+    properties.collect()
 }

@@ -47,7 +47,8 @@ pub(crate) fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
         Some(Telegram::Pdu(pdu).encode().to_vec())
     };
     let words = |address, ppo| telegram(address, Service::DataExchange, &safe_image().encode(ppo));
-    let at_once = slaves.iter().filter_map(|own| words(own.address, own.ppo?));
+    let at_once = slaves.iter();
+    let at_once = at_once.filter_map(|slave| words(slave.address, slave.ppo?));
     let again = slaves.iter().flat_map(|slave| {
         let address = slave.address;
         let known = slave.ppo.map_or(PpoType::ALL.to_vec(), |ppo| vec![ppo]);
@@ -88,9 +89,9 @@ pub(crate) fn safe_state<L: Line>(
     let mut reports = String::new();
     let mut confirmed = true;
     finish_telegrams(line);
-    let places = slaves.iter().map(|own| match line.slaves() {
-        Some(gate) => gate.places(own.address).collect(),
-        None => vec![own.address],
+    let places = slaves.iter().map(|slave| match line.slaves() {
+        Some(gate) => gate.places(slave.address).collect(),
+        None => vec![slave.address],
     });
     let places: Vec<Vec<u8>> = places.collect();
     let mut talk = Talk::new(Box::new(&mut *line), patience);
@@ -141,7 +142,7 @@ fn make_safe(
     let text = |error: TalkError| error.to_string();
     let (address, diagnosis) = found(talk, places)?;
     let exchanges = !diagnosis.has(Diagnosis::NOT_READY);
-    let other = diagnosis.master.filter(|own| exchanges && *own != MASTER);
+    let other = diagnosis.master.filter(|to| exchanges && *to != MASTER);
     if let Some(controls) = other {
         return Err(format!(
             "master {controls} controls it: stop it there, or switch that master off"
@@ -166,7 +167,7 @@ fn make_safe(
     let on = modes
         .into_iter()
         .filter(|(mode, _)| diagnosis.has_mode(*mode));
-    let command = on.fold(0, |command, (_, own)| command | own);
+    let command = on.fold(0, |command, (_, mode)| command | mode);
     if command != 0 {
         // What waits for Sync is then the word that stops; a frozen status word shows nothing.
         off.exchange(if stops { stw::QUICK_STOP } else { stw::SAFE })?;
@@ -268,7 +269,7 @@ impl Off<'_, '_> {
                 return Err(refused.unwrap_or(error).to_string());
             }
             refused = self.talk.start(address, ppo, Some(WATCHDOG)).err();
-            if let Some(error) = refused.as_ref().filter(|own| !has_left(own)) {
+            if let Some(error) = refused.as_ref().filter(|error| !has_left(error)) {
                 return Err(error.to_string());
             }
         }

@@ -91,18 +91,18 @@ pub(crate) fn bench(
         .unwrap_or(usual)
         .iter()
         .map(|address| format!("slave {address}\nslave {address} parameter 1621 = 2\n"));
-    let own = Source {
+    let setup = Source {
         name: "setup".to_owned(),
         text: lines.collect::<String>().into(),
     };
-    let mut scenario: Scenario<Nordac> = read(&own, Part::Header)?;
+    let mut scenario: Scenario<Nordac> = read(&setup, Part::Header)?;
     if let Some(header) = header {
         let more: Scenario<Nordac> = read(header, Part::Header)?;
         scenario.header.rate = more.header.rate.or(scenario.header.rate);
         scenario.header.slaves.extend(more.header.slaves);
     }
     scenario.steps.clear();
-    settle(&scenario, header.unwrap_or(&own), None)
+    settle(&scenario, header.unwrap_or(&setup), None)
 }
 
 impl SegmentServer {
@@ -134,10 +134,10 @@ impl SegmentServer {
     /// Sends telegrams that are complete, and what can no longer become one; with `all` also the begin of one.
     fn send(&mut self, seat: usize, all: bool) {
         let rate = self.rate();
-        let Some(own) = self.seats.get_mut(seat) else {
+        let Some(client) = self.seats.get_mut(seat) else {
             return;
         };
-        let begun: Vec<u8> = own.begun.iter().map(|octet| octet.byte).collect();
+        let begun: Vec<u8> = client.begun.iter().map(|octet| octet.byte).collect();
         let mut sent = 0;
         while sent < begun.len() {
             let rest = &begun[sent..];
@@ -150,10 +150,11 @@ impl SegmentServer {
                 Decoded::NeedMore if all => rest.len(),
                 Decoded::NeedMore => break,
             };
-            let octets: Vec<Octet> = own.begun[sent..sent + length].iter().map(octet).collect();
+            let octets = client.begun[sent..sent + length].iter().map(octet);
+            let octets: Vec<Octet> = octets.collect();
             let idle = rate.bit_time() * SYN_BITS;
-            let free = own.sent_by.max(self.bench.time()) + idle;
-            own.sent_by = free + rate.octet_time() * octets.len() as u64;
+            let free = client.sent_by.max(self.bench.time()) + idle;
+            client.sent_by = free + rate.octet_time() * octets.len() as u64;
             let wish = Wish {
                 ready: self.bench.time(),
                 idle_bits: SYN_BITS,
@@ -163,7 +164,7 @@ impl SegmentServer {
             }
             sent += length;
         }
-        own.begun.drain(..sent);
+        client.begun.drain(..sent);
     }
 
     /// Hands over what the clients' places have heard.
@@ -282,21 +283,21 @@ impl ServedBus for SegmentServer {
     }
 
     fn receive(&mut self, seat: usize, octets: &[u8]) -> Result<(), BadMark> {
-        let Some(own) = self.seats.get_mut(seat) else {
+        let Some(client) = self.seats.get_mut(seat) else {
             return Ok(());
         };
         let mut wrong = Ok(());
         for &octet in octets {
             match self.marks {
-                ErrorMarks::None => own.begun.push(Received::good(octet)),
-                ErrorMarks::InBand => match own.unmark.push(octet) {
+                ErrorMarks::None => client.begun.push(Received::good(octet)),
+                ErrorMarks::InBand => match client.unmark.push(octet) {
                     None => {}
                     Some(Err(bad)) => wrong = wrong.and(Err(bad)),
-                    Some(Ok(octet)) => own.begun.push(octet),
+                    Some(Ok(octet)) => client.begun.push(octet),
                 },
             }
         }
-        own.begun_at = self.clock;
+        client.begun_at = self.clock;
         self.send(seat, false);
         wrong
     }
@@ -311,8 +312,8 @@ impl ServedBus for SegmentServer {
             self.base = (self.clock, self.bench.time());
         }
         for seat in 0..self.seats.len() {
-            let own = &self.seats[seat];
-            if !own.begun.is_empty() && self.clock >= own.begun_at + GAP {
+            let client = &self.seats[seat];
+            if !client.begun.is_empty() && self.clock >= client.begun_at + GAP {
                 self.send(seat, true);
             }
         }
@@ -363,7 +364,7 @@ impl ServedBus for SegmentServer {
                 .trim()
                 .parse()
                 .ok()
-                .and_then(|own| self.bench.drive(own));
+                .and_then(|address| self.bench.drive(address));
             return Some(match drive {
                 Some(drive) => ControlAnswer::State(state(drive)),
                 None => ControlAnswer::Error(
@@ -389,9 +390,9 @@ impl ServedBus for SegmentServer {
 
     fn remarks(&mut self) -> Vec<String> {
         let slaves = self.plan.setup.slaves.iter();
-        let now = slaves.map(|own| (own.address, self.bench.drive(own.address)));
+        let now = slaves.map(|slave| (slave.address, self.bench.drive(slave.address)));
         let now: Vec<_> = now
-            .map(|(slave, drive)| (slave, drive.and_then(|own| own.slave().refusal())))
+            .map(|(slave, drive)| (slave, drive.and_then(|drive| drive.slave().refusal())))
             .collect();
         self.refusals.resize(now.len(), None);
         let mut news = Vec::new();
@@ -412,7 +413,8 @@ impl ServedBus for SegmentServer {
 /// What a drive shows outside the bus: states, and the size of its frequency in 0.1 Hz.
 fn state(drive: &Drive) -> String {
     let (slave, inverter) = (drive.slave(), drive.inverter());
-    let frequency = Parameter::of(1813).and_then(|own| inverter.parameter(own, Index::default()));
+    let row = Parameter::of(1813);
+    let frequency = row.and_then(|row| inverter.parameter(row, Index::default()));
     let refused = slave.refusal().map(|why| format!(" refused=\"{why}\""));
     format!(
         "power={} address={} dp={} state={} frequency={}{}",

@@ -166,9 +166,9 @@ fn memory_is_bounded() {
 fn a_page_counts_tokens_of_a_lone_master() {
     let mut clients = Clients::new(1, ErrorMarks::None);
     clients.server.watch(true);
-    let own = [0xDC, 2, 2];
+    let first = [0xDC, 2, 2];
     let other = [0xDC, 3, 2];
-    for telegram in [&own[..], &STATUS, &own, &own, &other] {
+    for telegram in [&first[..], &STATUS, &first, &first, &other] {
         clients.send(0, telegram);
         clients.pass(Span::from_millis(10));
     }
@@ -178,7 +178,7 @@ fn a_page_counts_tokens_of_a_lone_master() {
         .map(|row| (row.fold, row.words.as_str()))
         .collect();
     assert_eq!(said.len(), 4, "{said:?}");
-    assert!(said[..3].iter().all(|own| own.0 == 0), "{said:?}");
+    assert!(said[..3].iter().all(|said| said.0 == 0), "{said:?}");
     assert!(said[2].1.starts_with("token  2 gives it to 3"), "{said:?}");
     assert_eq!(said[3], (3, "token 2\u{2192}2"));
 }
@@ -193,7 +193,7 @@ fn slaves_of_header_and_command_line() {
     };
     let addresses = |plan: &harness_bench::scenario::plan::Plan<super::language::Nordac>| {
         let slaves = plan.setup.slaves.iter();
-        slaves.map(|own| own.address).collect::<Vec<_>>()
+        slaves.map(|slave| slave.address).collect::<Vec<_>>()
     };
     let plan = bench(Some(&[8, 20]), Some(&header)).expect("a bench");
     assert_eq!(addresses(&plan), [8, 20, 9]);
@@ -234,7 +234,7 @@ fn why_a_slave_refuses_its_master_is_said() {
         (&[0xF1], "PPO3, to which the slave is set (1622), is F1"),
         (&[0xF5], "PPO4, to which the slave is set (1622), is F5"),
     ];
-    for (place, (cfg, own)) in configurations.iter().enumerate() {
+    for (place, (cfg, refusal)) in configurations.iter().enumerate() {
         let header = format!("slave 8 ppo {}\n", place + 1);
         let header = Source::from_bytes("setup".into(), header.into_bytes()).expect("a text");
         let plan = bench(None, Some(&header)).expect("a bench");
@@ -268,13 +268,13 @@ fn why_a_slave_refuses_its_master_is_said() {
             .filter(|other| other != cfg)
         {
             rows.push((right.clone(), String::new()));
-            let shown: Vec<_> = other.iter().map(|own| format!("{own:02X}")).collect();
+            let shown: Vec<_> = other.iter().map(|octet| format!("{octet:02X}")).collect();
             let shown = if other.is_empty() {
                 "empty".to_owned()
             } else {
                 shown.join(" ")
             };
-            let why = format!("its configuration is {shown}, and that of {own}");
+            let why = format!("its configuration is {shown}, and that of {refusal}");
             rows.push((chk_cfg(2, other), why));
         }
         rows.push((right.clone(), String::new()));

@@ -34,7 +34,6 @@ pub(crate) struct SlaveSetup {
     pub(crate) ppo: PpoType,
     /// Whether it has the PosiCon option.
     pub(crate) posicon: bool,
-    /// What the manual leaves open.
     pub(crate) properties: Properties,
     /// Parameters that differ from the factory settings, and their values.
     pub(crate) parameters: Vec<(&'static Parameter, Index, i64)>,
@@ -63,19 +62,19 @@ impl SlaveSetup {
     #[must_use]
     pub(crate) fn drive(&self, rate: BusRate, power_up: Instant) -> Deviant {
         let none = Index::default();
-        let own = [
+        let fixed = [
             (ADDRESS, none, self.address.into()),
             (PPO, none, self.ppo.raw().into()),
         ];
         let more = self.parameters.iter();
-        let more = more.map(|(own, index, value)| {
+        let more = more.map(|(parameter, index, value)| {
             (
-                own.number,
+                parameter.number,
                 *index,
                 i32::try_from(*value).unwrap_or(i32::MAX),
             )
         });
-        let parameters = own.into_iter().chain(more);
+        let parameters = fixed.into_iter().chain(more);
         let setup = nordac::InverterSetup {
             properties: self.properties,
             posicon: self.posicon,
@@ -137,13 +136,13 @@ impl Bench {
         let guests = (0..guests).map(|_| Member::Host(LineHost::default()));
         let slaves = setup.slaves.iter();
         let slave =
-            |own: &SlaveSetup| Member::Drive(Box::new(own.drive(setup.rate, Instant::START)));
+            |slave: &SlaveSetup| Member::Drive(Box::new(slave.drive(setup.rate, Instant::START)));
         let stations = std::iter::once(bench).chain(slaves.map(slave));
         let stations = stations.chain(guests).collect();
         Self {
             line: OctetSegment::new(setup.rate.format(), stations),
             rate: setup.rate,
-            addresses: setup.slaves.iter().map(|own| own.address).collect(),
+            addresses: setup.slaves.iter().map(|slave| slave.address).collect(),
             clock: BenchClock::default(),
             master: setup.master,
         }
@@ -202,17 +201,18 @@ impl Bench {
     #[must_use]
     pub(crate) fn drive(&self, slave: u8) -> Option<&Drive> {
         let station = self.line.station(self.place(slave)?);
-        station.drive().map(|own| own.drive())
+        station.drive().map(|drive| drive.drive())
     }
 
     fn drive_mut(&mut self, slave: u8) -> Option<&mut Drive> {
         let place = self.place(slave)?;
         let station = self.line.station_mut(place);
-        station.drive_mut().map(|own| own.drive_mut())
+        station.drive_mut().map(|drive| drive.drive_mut())
     }
 
     fn place(&self, slave: u8) -> Option<usize> {
-        let place = self.addresses.iter().position(|own| *own == slave)?;
+        let mut addresses = self.addresses.iter();
+        let place = addresses.position(|address| *address == slave)?;
         Some(place + 1)
     }
 
@@ -249,9 +249,9 @@ impl Bench {
             PlacedFault::Stimulus(_, AnyStimulus::Line(placed)) => {
                 self.line.inject(placed);
             }
-            PlacedFault::Stimulus(slave, AnyStimulus::Nordac(own)) => {
+            PlacedFault::Stimulus(slave, AnyStimulus::Nordac(stimulus)) => {
                 if let Some(drive) = self.drive_mut(slave) {
-                    match own {
+                    match stimulus {
                         Stimulus::Link(found) => drive.set_link(now, !found),
                         Stimulus::Fault(number, on) => {
                             drive.inverter_mut().set_cause(now, on.then_some(number));
@@ -352,7 +352,7 @@ impl Link for Bench {
         self.line.is_busy()
             || places
                 .into_iter()
-                .any(|own| self.line.station(own).wants().is_some())
+                .any(|place| self.line.station(place).wants().is_some())
     }
 
     fn inject(&mut self, _port: usize, fault: PlacedFault, moment: Moment) {
@@ -371,7 +371,8 @@ impl Link for Bench {
     }
 
     fn unused_faults(&self) -> Vec<String> {
-        let placed = self.line.unused_faults().iter().map(|own| self.words(own));
+        let placed = self.line.unused_faults().iter();
+        let placed = placed.map(|fault| self.words(fault));
         let scheduled = self.clock.left_over();
         let scheduled = scheduled.map(|(at, fault)| format!("{fault} at {at}"));
         placed.chain(scheduled).collect()
@@ -414,13 +415,13 @@ impl Bench {
             Some(BENCH) => "master ".to_owned(),
             Some(place) => {
                 let slave = self.addresses.get(place - 1);
-                slave.map_or(String::new(), |own| format!("slave {own} "))
+                slave.map_or(String::new(), |slave| format!("slave {slave} "))
             }
         };
         let number = placed.number;
         match placed.fault {
-            LineFault::Octet(own) => format!("{sender}byte {number}: {own}"),
-            LineFault::Telegram(own) => format!("{sender}telegram {number}: {own}"),
+            LineFault::Octet(fault) => format!("{sender}byte {number}: {fault}"),
+            LineFault::Telegram(fault) => format!("{sender}telegram {number}: {fault}"),
         }
     }
 }

@@ -60,7 +60,8 @@ impl Accounting for RequestAndReply {
         let _too_long = self.request.push(octet);
         if let Decoded::Value { value, .. } = Telegram::decode(&self.request) {
             let replies = |pdu: &harness_proto::profibus::Pdu| {
-                let sends_only = pdu.fc().function().is_some_and(|own| own.is_sdn());
+                let function = pdu.fc().function();
+                let sends_only = function.is_some_and(|function| function.is_sdn());
                 pdu.da() != BROADCAST && !sends_only && pdu.fc().is_request()
             };
             self.owed = value.pdu().is_some_and(replies);
@@ -151,8 +152,8 @@ impl SegmentLink {
             other => other.value(),
         };
         self.begun.clear();
-        let asked = telegram.and_then(|own| own.pdu().map(|pdu| pdu.da()));
-        if let Some(asked) = asked.filter(|own| *own <= LAST_ADDRESS)
+        let asked = telegram.and_then(|telegram| telegram.pdu().map(|pdu| pdu.da()));
+        if let Some(asked) = asked.filter(|address| *address <= LAST_ADDRESS)
             && self.asked.last().is_none_or(|(_, last)| *last != asked)
             && self.asked.len() < MOST_RECORDED
         {
@@ -226,7 +227,7 @@ impl PortLink for SegmentLink {
     /// One telegram behind the other, each with its idle time.
     fn last_words(&self) -> std::io::Result<Vec<LastWords>> {
         let ports = self.pump.last_words(telegrams)?;
-        let apart = ports.into_iter().map(|own| own.after(LAST_WORDS_GAP));
+        let apart = ports.into_iter().map(|words| words.after(LAST_WORDS_GAP));
         Ok(apart.collect())
     }
 
@@ -239,8 +240,8 @@ impl PortLink for SegmentLink {
     }
 
     fn has_unproven_rate(&self, port: usize) -> bool {
-        let own = self.pump.ports.get(port);
-        own.is_some_and(|own| own.wire.has_unproven_rate())
+        let port_pump = self.pump.ports.get(port);
+        port_pump.is_some_and(|port| port.wire.has_unproven_rate())
     }
 
     fn take_switches(&mut self) -> Vec<Switch> {
@@ -300,16 +301,16 @@ impl Link for SegmentLink {
     }
 
     fn trace(&self, port: usize) -> Trace {
-        let Some(own) = self.pump.ports.get(port) else {
+        let Some(port_pump) = self.pump.ports.get(port) else {
             return Trace::default();
         };
-        let [sent, came] = &own.log;
+        let [sent, came] = &port_pump.log;
         let from = |slave: u8| -> Vec<LineByte> {
             let first = self.slaves.first().copied();
             let of = |octet: &&LineByte| {
                 let sender = self
                     .sender(octet.at)
-                    .filter(|own| self.slaves.contains(own));
+                    .filter(|slave| self.slaves.contains(slave));
                 sender.or(first) == Some(slave)
             };
             came.iter().filter(of).copied().collect()

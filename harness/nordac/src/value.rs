@@ -17,7 +17,6 @@ pub(crate) const THEN: &str = "then";
 /// A process word of a reply (NORDAC 3.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ReplyWord {
-    /// The status word.
     Status,
     /// The main actual value.
     Actual,
@@ -35,8 +34,8 @@ impl ReplyWord {
 
     #[must_use]
     pub(crate) fn name(self) -> &'static str {
-        let own = Self::ALL.iter().find(|(_, word)| *word == self);
-        own.map_or("", |(name, _)| name)
+        let row = Self::ALL.iter().find(|(_, word)| *word == self);
+        row.map_or("", |(name, _)| name)
     }
 
     /// Its value in a reply.
@@ -83,7 +82,7 @@ impl Cell {
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Word(word) => word.name().to_owned(),
-            Self::Parameter(own) => format!("{own} {}", own.parameter.name),
+            Self::Parameter(parameter) => format!("{parameter} {}", parameter.parameter.name),
         }
     }
 }
@@ -94,7 +93,7 @@ impl Cell {
 /// What is wrong and what is expected, in a sentence.
 pub(crate) fn parameter(text: &str) -> Result<ParameterRef, String> {
     ParameterRef::parse(text).map_err(|error| {
-        let names: Vec<_> = PARAMETERS.iter().map(|own| own.name).collect();
+        let names: Vec<_> = PARAMETERS.iter().map(|parameter| parameter.name).collect();
         let near = match error {
             NoParameter::Name => nearest(text, &names),
             _ => None,
@@ -139,7 +138,7 @@ pub(crate) fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
 pub(crate) fn every(wanted: impl Fn(&Parameter) -> bool) -> impl Iterator<Item = ParameterRef> {
     PARAMETERS
         .iter()
-        .filter(move |own| wanted(own))
+        .filter(move |parameter| wanted(parameter))
         .flat_map(|parameter| {
             let sets = 0..parameter.sets();
             (0..u16::from(parameter.count)).flat_map(move |element| {
@@ -207,21 +206,26 @@ pub(crate) fn assignments(texts: &[String]) -> Result<Vec<Assignment>, String> {
 /// Whether a text is the unit of some parameter.
 fn is_unit(text: &str) -> bool {
     text == "rpm"
-        || PARAMETERS
-            .iter()
-            .any(|own| !own.unit.name.is_empty() && own.unit.name.eq_ignore_ascii_case(text))
+        || PARAMETERS.iter().any(|parameter| {
+            !parameter.unit.name.is_empty() && parameter.unit.name.eq_ignore_ascii_case(text)
+        })
 }
 
+/// Octets in hexadecimal: `81 00`.
+pub(crate) fn hex<'a>(octets: impl IntoIterator<Item = &'a u8>) -> String {
+    let octets = octets.into_iter().map(|octet| format!("{octet:02X}"));
+    octets.collect::<Vec<_>>().join(" ")
+}
 fn assignment(name: &str, value: &str) -> Result<Assignment, String> {
     let parameter = parameter(name)?;
-    let own = parameter.parameter;
-    if own.has(Flag::ReadOnly) {
-        return Err(format!("parameter {parameter} ({}) is read only", own.name));
+    let row = parameter.parameter;
+    if row.has(Flag::ReadOnly) {
+        return Err(format!("parameter {parameter} ({}) is read only", row.name));
     }
-    let wrong = |why: String| format!("`{value}` is no value of {parameter} ({}): {why}", own.name);
-    let number = own.parse(parameter.index.element, value);
+    let wrong = |why: String| format!("`{value}` is no value of {parameter} ({}): {why}", row.name);
+    let number = row.parse(parameter.index.element, value);
     let number = number.map_err(|error| wrong(error.to_string()))?;
-    match own.raw_of(number) {
+    match row.raw_of(number) {
         Some(_) => Ok(Assignment { parameter, number }),
         None => Err(wrong("it is larger than the parameter".to_owned())),
     }
@@ -270,7 +274,7 @@ pub(crate) fn steps(texts: &[String]) -> Result<Vec<ExchangeStep>, String> {
             ));
         }
     }
-    match steps.iter().any(|own| *own == ExchangeStep::default()) {
+    match steps.iter().any(|step| *step == ExchangeStep::default()) {
         true => Err("a step has no words: STW=047E, for example, expected".to_owned()),
         false => Ok(steps),
     }
@@ -325,11 +329,11 @@ mod tests {
     use super::*;
 
     fn all(texts: &[&str]) -> Result<Vec<(String, i64)>, String> {
-        let texts: Vec<_> = texts.iter().map(|own| (*own).to_owned()).collect();
+        let texts: Vec<_> = texts.iter().map(|text| (*text).to_owned()).collect();
         let found = assignments(&texts)?;
         let shown = found
             .iter()
-            .map(|own| (own.parameter.to_string(), own.number));
+            .map(|assignment| (assignment.parameter.to_string(), assignment.number));
         Ok(shown.collect())
     }
 
@@ -449,7 +453,7 @@ mod tests {
         );
         let fault = parameter("1800").expect("a parameter");
         assert_eq!(shown(&fault, 10), "10 (bus time-out)");
-        let first = every(|own| own.number == 1716);
+        let first = every(|parameter| parameter.number == 1716);
         assert_eq!(first.count(), 256);
     }
 }

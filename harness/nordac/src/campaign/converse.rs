@@ -22,7 +22,6 @@ use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineFaultAt, LineHost, OctetSegment, Wish};
 use std::fmt;
 
-/// The stations.
 const MASTER: usize = 0;
 const SLAVE: usize = 1;
 const ADDRESSES: (u8, u8) = (2, 8);
@@ -53,7 +52,6 @@ pub(crate) enum StepEnd {
     Exchanged(Image),
     /// The answer of the parameter channel, as it stands in the inputs.
     Answered(String),
-    /// A wait has passed.
     Waited,
 }
 
@@ -149,9 +147,9 @@ impl Desk {
     fn state(&self) -> Option<SlaveState> {
         let drive = self.line.station(SLAVE).drive()?;
         let inverter = drive.inverter();
-        let values = PARAMETERS.iter().flat_map(|own| {
-            let sets = 0..own.sets();
-            sets.map(move |set| inverter.parameter(own, Index { element: 0, set }))
+        let values = PARAMETERS.iter().flat_map(|parameter| {
+            let sets = 0..parameter.sets();
+            sets.map(move |set| inverter.parameter(parameter, Index { element: 0, set }))
         });
         Some(SlaveState {
             dp: drive.slave().state(),
@@ -208,10 +206,10 @@ impl Desk {
         let mut startup = Startup::new(self.ppo, None);
         while let Some(request) = startup
             .next(&mut self.requests)
-            .map_err(|own| own.to_string())?
+            .map_err(|error| error.to_string())?
         {
             let reply = self.ask(&request);
-            startup.take(reply).map_err(|own| own.to_string())?;
+            startup.take(reply).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
@@ -219,8 +217,9 @@ impl Desk {
     /// One exchange: its inputs, and an answer that has come with it.
     fn once(&mut self) -> Result<(Image, Option<String>), String> {
         let request = self.exchange.exchange(&mut self.requests);
-        let reply = self.ask(&request.map_err(|own| own.to_string())?);
-        let done = self.exchange.take(reply).map_err(|own| own.to_string())?;
+        let reply = self.ask(&request.map_err(|error| error.to_string())?);
+        let done = self.exchange.take(reply);
+        let done = done.map_err(|error| error.to_string())?;
         let answer = done.answer.map(|_| done.inputs.pkw.to_string());
         Ok((done.inputs, answer))
     }
@@ -255,7 +254,7 @@ impl Desk {
     /// Sends, and takes what has come until the line is idle.
     fn send(&mut self, octets: &[u8]) -> Option<SlaveReply> {
         let slot = RATE.bit_time() * SLOT_BITS;
-        let own = octets.iter().copied().map(Into::into).collect();
+        let words = octets.iter().copied().map(Into::into).collect();
         let wish = Wish {
             ready: self.now,
             idle_bits: SYN_BITS,
@@ -265,7 +264,7 @@ impl Desk {
         self.log.push(MasterPiece::Sent(self.now, sent));
         let host = self.line.station_mut(MASTER).host_mut()?;
         host.forget();
-        host.send(wish, own);
+        host.send(wish, words);
         let sent = self.now + RATE.bit_time() * SYN_BITS + RATE.octet_time() * octets.len() as u64;
         self.run(sent + slot);
         while self.line.is_busy() {
@@ -275,12 +274,12 @@ impl Desk {
         if heard.is_empty() {
             return None;
         }
-        let octets: Vec<u8> = heard.iter().map(|own| own.byte).collect();
+        let octets: Vec<u8> = heard.iter().map(|octet| octet.byte).collect();
         self.telegrams.push((true, octets.clone()));
         // What comes behind a whole telegram is not read.
         match Telegram::decode(&octets) {
             Decoded::Value { value, used }
-                if heard[..used].iter().all(|own| own.error.is_none()) =>
+                if heard[..used].iter().all(|octet| octet.error.is_none()) =>
             {
                 self.requests.take(&value)
             }
@@ -291,7 +290,7 @@ impl Desk {
     /// Takes what has come.
     fn take_heard(&mut self) -> Vec<Received> {
         let host = self.line.station_mut(MASTER).host_mut();
-        let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, own)| own));
+        let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, octet)| octet));
         let heard: Vec<_> = heard.into_iter().flatten().collect();
         if !heard.is_empty() {
             self.log.push(MasterPiece::Received(heard.clone()));

@@ -11,7 +11,6 @@ use harness_sim::octet_segment::{LineFault, TelegramFault};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct TelegramCampaignFile {
@@ -26,7 +25,6 @@ struct TelegramCampaignFile {
     ppo: u8,
     /// What the master does, see [`CampaignStep`].
     steps: Vec<String>,
-    /// The kinds of faults.
     faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
@@ -43,7 +41,6 @@ const fn one() -> u8 {
     1
 }
 
-/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum FaultName {
@@ -64,7 +61,6 @@ pub(super) enum FaultName {
 }
 
 impl FaultName {
-    /// The faults of this kind.
     pub(super) fn faults(self, delays: &[Time]) -> Vec<LineFault> {
         let flip = |flips| LineFault::Octet(LinkFault::Flip(flips));
         let data = |bits: u8| {
@@ -107,7 +103,6 @@ impl FaultName {
     }
 }
 
-/// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CampaignStep {
     /// `start`: Slave_Diag, Set_Prm, Chk_Cfg, Slave_Diag.
@@ -174,7 +169,6 @@ pub(super) fn read(text: &str) -> Result<(Telegrams, LineText), String> {
     Ok((telegrams, text))
 }
 
-/// One step.
 fn step(text: &str) -> Result<CampaignStep, String> {
     let words: Vec<_> = text.split_whitespace().collect();
     let parameter = |name: &str| ParameterRef::parse(name).map_err(|error| error.to_string());

@@ -7,6 +7,7 @@ mod file;
 #[cfg(test)]
 mod tests;
 
+use crate::value::hex;
 use converse::{SlaveState, StepEnd};
 use file::{CampaignStep, FaultName};
 use harness_bench::bus_name::BusName;
@@ -175,11 +176,6 @@ impl DisturbedLine for Telegrams {
             });
         hex(octets.iter().map(|octet| &octet.byte)) + &bad.collect::<String>()
     }
-}
-
-fn hex<'a>(octets: impl Iterator<Item = &'a u8>) -> String {
-    let octets: Vec<_> = octets.map(|octet| format!("{octet:02X}")).collect();
-    octets.join(" ")
 }
 
 /// `once`, `twice`, `3 times`.

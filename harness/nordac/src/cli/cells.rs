@@ -17,38 +17,35 @@ pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io:
 /// The numbers of all parameters, and the words of a reply: names with spaces need quotes, which a shell does not add.
 pub(crate) fn names() -> impl Iterator<Item = String> {
     let words = ReplyWord::ALL.map(|(name, _)| name.to_owned());
-    let numbers = PARAMETERS.iter().map(|own| own.number.to_string());
+    let numbers = PARAMETERS.iter().map(|row| row.number.to_string());
     words.into_iter().chain(numbers)
 }
 
 /// Number, flags, name, section, limits and factory setting, and what behind its number selects a set or an element.
-fn line(own: &Parameter) -> String {
+fn line(parameter: &Parameter) -> String {
     let limit = |limit: Limit| match limit {
-        Limit::Raw(raw) => own.show(0, raw.into()).to_string(),
+        Limit::Raw(raw) => parameter.show(0, raw.into()).to_string(),
         other => other.to_string(),
     };
+    let number = parameter.number;
     let mut line = format!(
-        "{} {:03X} {:4} {:34} {:5} {} to {}, factory setting {}",
-        own.number,
-        own.number,
-        own.flags,
-        own.name,
-        own.section,
-        limit(own.least),
-        limit(own.most),
-        own.show(0, own.default.into())
+        "{number} {number:03X} {:4} {:34} {:5} {} to {}, factory setting {}",
+        parameter.flags,
+        parameter.name,
+        parameter.section,
+        limit(parameter.least),
+        limit(parameter.most),
+        parameter.show(0, parameter.default.into())
     );
-    let last = own.count.saturating_sub(1);
-    match (own.is_array(), own.has(Flag::Set)) {
+    let last = parameter.count.saturating_sub(1);
+    match (parameter.is_array(), parameter.has(Flag::Set)) {
         (true, true) => line.push_str(&format!(
-            "; {}.ELEMENT.SET, elements 0 to {last}, sets 1 to 4",
-            own.number
+            "; {number}.ELEMENT.SET, elements 0 to {last}, sets 1 to 4"
         )),
-        (true, false) if last > 0 => line.push_str(&format!(
-            "; sub-indices {}.0 to {}.{last}",
-            own.number, own.number
-        )),
-        (false, true) => line.push_str(&format!("; sets {}.1 to {}.4", own.number, own.number)),
+        (true, false) if last > 0 => {
+            line.push_str(&format!("; sub-indices {number}.0 to {number}.{last}"));
+        }
+        (false, true) => line.push_str(&format!("; sets {number}.1 to {number}.4")),
         _ => {}
     }
     line

@@ -91,7 +91,7 @@ pub(super) fn start(
         let mut objects = Vec::new();
         let exit = each(session, &select.drives, output, |driver, slave| {
             let started = driver.start(slave, None)?;
-            let diagnosis = started.diagnosis.map(|own| own.encode().to_string());
+            let diagnosis = started.diagnosis.map(|data| data.encode().to_string());
             let diagnosis = diagnosis.unwrap_or_default();
             let (ppo, octets) = (started.ppo, started.ppo.octets());
             let image = started.inputs;
@@ -128,7 +128,7 @@ pub(super) fn exchange(
         let longest = longest_hold(session);
         let mut driver = driver(session);
         driver.join(slave)?;
-        let hertz = |own: &ExchangeStep| matches!(own.setpoint, Some(Setpoint::Tenths(_)));
+        let hertz = |step: &ExchangeStep| matches!(step.setpoint, Some(Setpoint::Tenths(_)));
         let maximum = supervised(&mut driver, slave, steps.iter().any(hertz))?;
         let mut words = [0; 4];
         let mut all = Vec::new();
@@ -277,7 +277,6 @@ pub(super) fn stop(
     })
 }
 
-/// Acknowledges faults.
 pub(super) fn acknowledge(
     bench: PortBench<'_, Inverters>,
     arguments: &AcknowledgeArguments,
@@ -388,7 +387,7 @@ const fn enables(word: u16) -> bool {
 
 /// The control words that led to a state, and the reply that shows it.
 fn sent(reached: &Reached) -> String {
-    let words: Vec<_> = reached.words().map(|own| format!("{own:04X}")).collect();
+    let words: Vec<_> = reached.words().map(|word| format!("{word:04X}")).collect();
     format!("STW {} -> {}", words.join(", "), reply(&reached.inputs))
 }
 

@@ -74,7 +74,7 @@ impl CommandDrives for Inverters {
 
 /// What a slave has answered, for tools and in words.
 fn answer(slave: RigSlave, diagnosis: &Diagnosis) -> (Value, String) {
-    let ppo = slave.ppo.map(|own| own.number());
+    let ppo = slave.ppo.map(|ppo| ppo.number());
     let names: Vec<_> = diagnosis.names().collect();
     let object = json!({
         "address": slave.address, "ppo": ppo, "diagnosis": names, "master": diagnosis.master,
@@ -84,7 +84,7 @@ fn answer(slave: RigSlave, diagnosis: &Diagnosis) -> (Value, String) {
         None => "not in the exchange".to_owned(),
         Some(master) => format!("in the exchange with master {master}"),
     };
-    let ppo = ppo.map_or("of no PPO type".to_owned(), |own| format!("PPO type {own}"));
+    let ppo = ppo.map_or("of no PPO type".to_owned(), |ppo| format!("PPO type {ppo}"));
     let names = names.join(", ");
     (object, format!("{ppo}, {state}; diagnosis: {names}"))
 }

@@ -62,21 +62,21 @@ impl Seen {
     }
 
     fn of(&self, heading: &str) -> String {
-        let own = self.parameters.iter().find(|(name, _)| *name == heading);
-        own.map_or_else(|| "-".to_owned(), |(_, found)| value(found))
+        let row = self.parameters.iter().find(|(name, _)| *name == heading);
+        row.map_or_else(|| "-".to_owned(), |(_, found)| value(found))
     }
 }
 
 /// A value in words; 0 is no fault, and no time-out.
 fn value(found: &Found) -> String {
     match (found.cell, found.number) {
-        (Cell::Parameter(own), 0) if matches!(own.parameter.number, 1800..=1805) => {
+        (Cell::Parameter(parameter), 0) if matches!(parameter.parameter.number, 1800..=1805) => {
             "none".to_owned()
         }
-        (Cell::Parameter(own), 0) if own.parameter.number == 1625 => {
+        (Cell::Parameter(parameter), 0) if parameter.parameter.number == 1625 => {
             "none: nothing stops the motor if the master fails".to_owned()
         }
-        (Cell::Parameter(own), 0) if own.parameter.number == 1621 => {
+        (Cell::Parameter(parameter), 0) if parameter.parameter.number == 1621 => {
             "0: local, the bus does not control it".to_owned()
         }
         _ => found.words(),
@@ -91,10 +91,10 @@ fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Re
     let mut parameters = Vec::new();
     if ppo.has_pkw() {
         for (name, text) in SHOWN.into_iter().filter(|(name, _)| wanted(name)) {
-            let Ok(own) = parameter(text) else {
+            let Ok(named) = parameter(text) else {
                 continue;
             };
-            let found = find(driver, slave, &[Cell::Parameter(own)])?;
+            let found = find(driver, slave, &[Cell::Parameter(named)])?;
             parameters.extend(found.into_iter().map(|found| (name, found)));
         }
     }
@@ -180,7 +180,7 @@ static FORM: TopForm = TopForm {
 fn row(seen: &Seen) -> TopRow {
     let mut words = seen.words.iter().map(Found::words);
     let (status, actual) = (words.next(), words.next());
-    let mut numbers = seen.words.iter().map(|own| own.number as u16);
+    let mut numbers = seen.words.iter().map(|word| word.number as u16);
     let (zsw, hiw) = (numbers.next().unwrap_or(0), numbers.next());
     let state = State::of_zsw(zsw);
     let fault = seen.parameters.iter().find(|(name, _)| *name == "fault");
@@ -188,9 +188,9 @@ fn row(seen: &Seen) -> TopRow {
     TopRow {
         state: FORM.state(state.map_or("no state of the manual", State::name)),
         in_error,
-        speed: hiw.map(|own| f64::from(own.cast_signed())),
+        speed: hiw.map(|speed| f64::from(speed.cast_signed())),
         error: fault
-            .and_then(|(_, own)| u32::try_from(own.number).ok())
+            .and_then(|(_, found)| u32::try_from(found.number).ok())
             .filter(|_| in_error),
         cells: vec![
             seen.slave.to_string(),

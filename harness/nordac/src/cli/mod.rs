@@ -41,22 +41,24 @@ impl HeldDrives for Inverters {
         output: &mut Output,
     ) -> Result<Exit, Failure> {
         match command {
-            DriveCommand::Write(own) => write::write(bench, own, output),
-            DriveCommand::Stop(own) => control::stop(bench, STOP, own, output),
-            DriveCommand::Block(own) => control::stop(bench, BLOCK, own, output),
-            DriveCommand::Cyclic(CyclicCommand::Start(own)) => control::start(bench, own, output),
-            DriveCommand::Cyclic(CyclicCommand::Exchange(own)) => {
-                control::exchange(bench, own, output)
+            DriveCommand::Write(args) => write::write(bench, args, output),
+            DriveCommand::Stop(args) => control::stop(bench, STOP, args, output),
+            DriveCommand::Block(args) => control::stop(bench, BLOCK, args, output),
+            DriveCommand::Cyclic(CyclicCommand::Start(args)) => control::start(bench, args, output),
+            DriveCommand::Cyclic(CyclicCommand::Exchange(args)) => {
+                control::exchange(bench, args, output)
             }
-            DriveCommand::Cyclic(CyclicCommand::On(own)) => control::on(bench, own, output),
-            DriveCommand::Cyclic(CyclicCommand::Off(own)) => control::stop(bench, OFF, own, output),
-            DriveCommand::Cyclic(CyclicCommand::QuickStop(own)) => {
-                control::stop(bench, QUICK_STOP, own, output)
+            DriveCommand::Cyclic(CyclicCommand::On(args)) => control::on(bench, args, output),
+            DriveCommand::Cyclic(CyclicCommand::Off(args)) => {
+                control::stop(bench, OFF, args, output)
             }
-            DriveCommand::Cyclic(CyclicCommand::Acknowledge(own)) => {
-                control::acknowledge(bench, own, output)
+            DriveCommand::Cyclic(CyclicCommand::QuickStop(args)) => {
+                control::stop(bench, QUICK_STOP, args, output)
             }
-            DriveCommand::Go(own) => control::go(bench, own, output),
+            DriveCommand::Cyclic(CyclicCommand::Acknowledge(args)) => {
+                control::acknowledge(bench, args, output)
+            }
+            DriveCommand::Go(args) => control::go(bench, args, output),
             _ => Err(Failure::refused(
                 "this command is for drives of another bus; on NORDAC inverters there are start, exchange, on, off, quick-stop, stop, block, acknowledge, read, write, watch, info, top and params",
             )),

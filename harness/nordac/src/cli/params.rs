@@ -26,8 +26,8 @@ const NOT_KEPT: [u16; 5] = [970, 971, 1602, 1603, 1604];
 const REACHED: [u16; 6] = [1619, 1620, 1621, 1622, 1623, 1624];
 
 /// Whether a file keeps a parameter.
-fn is_kept(own: &Parameter) -> bool {
-    !own.has(Flag::ReadOnly) && !NOT_KEPT.contains(&own.number)
+fn is_kept(parameter: &Parameter) -> bool {
+    !parameter.has(Flag::ReadOnly) && !NOT_KEPT.contains(&parameter.number)
 }
 
 pub(super) const PARAMETERS: ParameterFile<Inverters, Assignment> = ParameterFile {
@@ -103,13 +103,16 @@ fn line(found: &Found) -> Option<String> {
 }
 
 /// The key of a parameter: with its set even where that is the first one.
-fn key(own: &ParameterRef) -> String {
-    let set = own.index.set + 1;
-    let number = own.parameter.number;
-    match (own.parameter.is_array(), own.parameter.has(Flag::Set)) {
-        (true, true) => format!("{number}.{}.{set}", own.index.element),
+fn key(parameter: &ParameterRef) -> String {
+    let ParameterRef {
+        parameter: row,
+        index,
+    } = parameter;
+    let (number, set) = (row.number, index.set + 1);
+    match (row.is_array(), row.has(Flag::Set)) {
+        (true, true) => format!("{number}.{}.{set}", index.element),
         (false, true) => format!("{number}.{set}"),
-        _ => own.to_string(),
+        _ => parameter.to_string(),
     }
 }
 
@@ -141,22 +144,22 @@ fn compare(
 /// A line of a file.
 fn entry(key: &str, value: &DeValue<'_>) -> Result<Assignment, EntryMistake> {
     let found = parameter(key).map_err(EntryMistake::Key)?;
-    let own = found.parameter;
-    if !is_kept(own) {
-        let why = format!("parameter {found} ({}) is not kept in a file", own.name);
+    let known = found.parameter;
+    if !is_kept(known) {
+        let why = format!("parameter {found} ({}) is not kept in a file", known.name);
         return Err(EntryMistake::Key(why));
     }
     let wrong =
-        |why: &dyn std::fmt::Display| EntryMistake::Value(format!("{key} ({}): {why}", own.name));
+        |why: &dyn std::fmt::Display| EntryMistake::Value(format!("{key} ({}): {why}", known.name));
     let text = match value {
         DeValue::Integer(number) => number.to_string(),
         DeValue::String(text) => text.to_string(),
         _ => return Err(wrong(&"this is no number")),
     };
-    let number = own
+    let number = known
         .parse(found.index.element, &text)
         .map_err(|error| wrong(&error))?;
-    match own.raw_of(number) {
+    match known.raw_of(number) {
         Some(_) => Ok(Assignment {
             parameter: found,
             number,
@@ -177,7 +180,8 @@ mod tests {
             all.map(|problem| format!("{}: {}", problem.span.start, problem.message))
                 .collect::<Vec<_>>()
         })?;
-        let all = found.iter().map(|own| (key(&own.parameter), own.number));
+        let all = found.iter();
+        let all = all.map(|found| (key(&found.parameter), found.number));
         Ok(all.collect())
     }
 

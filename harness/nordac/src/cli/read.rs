@@ -7,7 +7,6 @@ use harness_bench::command::watch::{HEX, WatchedCell, decimal};
 use harness_proto::nordac::PkwError;
 use serde_json::{Value, json};
 
-/// What was read.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found {
     pub(super) slave: u8,
@@ -34,8 +33,8 @@ impl Found {
         match self.cell {
             Cell::Word(ReplyWord::Actual) => (decimal(percent(self.word())), "%"),
             Cell::Word(_) => (self.raw(), HEX),
-            Cell::Parameter(own) => {
-                let unit = own.parameter.unit_of(own.index.element);
+            Cell::Parameter(parameter) => {
+                let unit = parameter.parameter.unit_of(parameter.index.element);
                 let text = unit.show(self.number).to_string();
                 let digits = text.strip_suffix(unit.name).unwrap_or(&text).trim_end();
                 (digits.to_owned(), unit.name)
@@ -47,7 +46,7 @@ impl Found {
     pub(super) fn words(&self) -> String {
         match self.cell {
             Cell::Word(word) => word.words(self.word()),
-            Cell::Parameter(own) => shown(&own, self.number),
+            Cell::Parameter(parameter) => shown(&parameter, self.number),
         }
     }
 }
@@ -64,10 +63,10 @@ pub(super) fn find(
     for &cell in cells {
         let number = match cell {
             Cell::Word(word) => word.of(&driver.cycle(slave)?).into(),
-            Cell::Parameter(own) if absent && own.parameter.needs_posicon() => continue,
-            Cell::Parameter(own) => match driver.read(slave, &own) {
+            Cell::Parameter(parameter) if absent && parameter.parameter.needs_posicon() => continue,
+            Cell::Parameter(parameter) => match driver.read(slave, &parameter) {
                 Err(Error::Refused { error, .. })
-                    if cells.len() > 1 && own.parameter.needs_posicon() =>
+                    if cells.len() > 1 && parameter.parameter.needs_posicon() =>
                 {
                     absent |= error == PkwError::Number;
                     continue;
@@ -91,7 +90,10 @@ impl CellReading for Found {
     fn row(&self) -> Vec<String> {
         let (number, name, section) = match self.cell {
             Cell::Word(word) => (word.name().to_owned(), "", "3.2"),
-            Cell::Parameter(own) => (own.to_string(), own.parameter.name, own.parameter.section),
+            Cell::Parameter(named) => {
+                let row = named.parameter;
+                (named.to_string(), row.name, row.section)
+            }
         };
         vec![
             self.slave.to_string(),
@@ -111,11 +113,11 @@ impl CellReading for Found {
         });
         match self.cell {
             Cell::Word(word) => object["word"] = json!(word.name()),
-            Cell::Parameter(own) => {
-                object["parameter"] = json!(own.to_string());
-                object["name"] = json!(own.parameter.name);
-                object["unit"] = json!(own.parameter.unit_of(own.index.element).name);
-                object["section"] = json!(own.parameter.section);
+            Cell::Parameter(parameter) => {
+                object["parameter"] = json!(parameter.to_string());
+                object["name"] = json!(parameter.parameter.name);
+                object["unit"] = json!(parameter.parameter.unit_of(parameter.index.element).name);
+                object["section"] = json!(parameter.parameter.section);
             }
         }
         object

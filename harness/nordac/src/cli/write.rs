@@ -39,8 +39,8 @@ pub(super) fn write(
         for slave in slaves {
             let mut at = slave;
             for order in &orders {
-                let (now_at, own) = one(&mut driver, at, order, output)?;
-                exit = exit.max(own);
+                let (now_at, order_exit) = one(&mut driver, at, order, output)?;
+                exit = exit.max(order_exit);
                 let Some(now_at) = now_at else {
                     break;
                 };
@@ -58,11 +58,11 @@ pub(super) fn refuse_denied(
     orders: &[Assignment],
 ) -> Result<(), Failure> {
     for order in orders {
-        let own = order.parameter.parameter;
-        let raw = own.raw_of(order.number).unwrap_or_default();
-        let ak = Task::change(own).ak();
+        let parameter = order.parameter.parameter;
+        let raw = parameter.raw_of(order.number).unwrap_or_default();
+        let ak = Task::change(parameter).ak();
         let image = Image {
-            pkw: Pkw::of(ak, own.number, order.parameter.ind(), raw),
+            pkw: Pkw::of(ak, parameter.number, order.parameter.ind(), raw),
             ..Image::default()
         };
         if let Some(why) = driver.denied(slave, &image)? {
@@ -80,15 +80,15 @@ fn one(
     output: &mut Output,
 ) -> Result<(Option<u8>, Exit), Failure> {
     let Assignment { parameter, number } = *order;
-    let own = parameter.parameter;
-    let name = format!("slave {slave}: {parameter} {}", own.name);
+    let known = parameter.parameter;
+    let name = format!("slave {slave}: {parameter} {}", known.name);
     match driver.write(slave, &parameter, number) {
         Ok(Written::Holds(holds)) => {
             output.result(&format!("{name} = {}\n", shown(&parameter, holds)))?;
             Ok((Some(slave), Exit::Passed))
         }
         Ok(Written::Restarted) => {
-            let at = match own.number {
+            let at = match known.number {
                 ADDRESS => u8::try_from(number).unwrap_or(slave),
                 number if FACTORY.contains(&number) => DEFAULT_ADDRESS,
                 _ => slave,

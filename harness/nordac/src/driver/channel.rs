@@ -106,7 +106,7 @@ impl Driver<'_> {
         answer: Answer,
         what: &'static str,
     ) -> Result<i64, Error> {
-        let own = parameter.parameter;
+        let known = parameter.parameter;
         let raw = match answer {
             Answer::Error(error) => {
                 return Err(Error::Refused {
@@ -116,8 +116,8 @@ impl Driver<'_> {
                     error,
                 });
             }
-            Answer::Word(word) | Answer::ArrayWord(word) if !own.has(Flag::Long) => word.into(),
-            Answer::Double(double) | Answer::ArrayDouble(double) if own.has(Flag::Long) => double,
+            Answer::Word(word) | Answer::ArrayWord(word) if !known.has(Flag::Long) => word.into(),
+            Answer::Double(double) | Answer::ArrayDouble(double) if known.has(Flag::Long) => double,
             _ => {
                 let answer = self.inputs(slave)?.pkw.to_string();
                 return Err(Error::WrongAnswer {
@@ -127,6 +127,6 @@ impl Driver<'_> {
                 });
             }
         };
-        Ok(own.number_of(raw))
+        Ok(known.number_of(raw))
     }
 }

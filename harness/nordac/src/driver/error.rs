@@ -1,5 +1,6 @@
 //! Why a call to a slave came to nothing.
 
+use crate::value::hex;
 use harness_bench::link::Trouble;
 use harness_proto::nordac::parameter::Limit;
 use harness_proto::nordac::words::{State, stw};
@@ -15,7 +16,6 @@ pub(crate) enum Error {
         "slave {slave} does not answer {service}: check its address (1624), the bit rate, its power, A and B of the line, and the termination"
     )]
     NoReply {
-        /// Its address.
         slave: u8,
         /// What was asked for: a service.
         service: &'static str,
@@ -24,25 +24,15 @@ pub(crate) enum Error {
     #[error(
         "the station at address {slave} has the ident number {ident:04X}, and a NORDAC vector has {IDENT:04X}"
     )]
-    OtherDevice {
-        /// The address.
-        slave: u8,
-        /// Its ident number.
-        ident: u16,
-    },
+    OtherDevice { slave: u8, ident: u16 },
     /// The slave belongs to another master.
     #[error(
         "slave {slave} exchanges data with master {master}: take that master off the line first"
     )]
-    Taken {
-        /// Its address.
-        slave: u8,
-        master: u8,
-    },
+    Taken { slave: u8, master: u8 },
     /// The slave does not get into the exchange.
     #[error("slave {slave} does not start{}", why_not_started(.diagnosis.as_ref(), *.ppo))]
     NotStarted {
-        /// Its address.
         slave: u8,
         /// The PPO type that it was asked for.
         ppo: PpoType,
@@ -52,10 +42,9 @@ pub(crate) enum Error {
     /// The slave has another configuration than every PPO type.
     #[error(
         "slave {slave} replies the configuration {}, which no PPO type has: F3 F1, F3 F5, F1 or F5 expected",
-        digits(.configuration)
+        hex(.configuration)
     )]
     Configuration {
-        /// Its address.
         slave: u8,
         /// What Get_Cfg replied.
         configuration: Vec<u8>,
@@ -66,36 +55,25 @@ pub(crate) enum Error {
         left(.not_activated.as_ref())
     )]
     Left {
-        /// Its address.
         slave: u8,
         /// The service that it has answered with RS.
         not_activated: Option<Service>,
     },
-    /// The slave was not started.
     #[error("slave {0} was not started")]
     NotRunning(u8),
     /// The PPO type has no parameter channel.
     #[error(
         "slave {slave} is set to {ppo}, which has no parameter channel: PPO1 or PPO2 (1622) carries parameters"
     )]
-    NoChannel {
-        /// Its address.
-        slave: u8,
-        ppo: PpoType,
-    },
+    NoChannel { slave: u8, ppo: PpoType },
     /// The parameter channel carries another answer than the one to the task.
     #[error(
         "slave {slave}: the parameter channel did not answer the task for {parameter} within 40 exchanges"
     )]
-    NoAnswer {
-        /// Its address.
-        slave: u8,
-        parameter: ParameterRef,
-    },
+    NoAnswer { slave: u8, parameter: ParameterRef },
     /// The slave answers with an error number (NORDAC 3.4.1).
     #[error("slave {slave} refuses to {what} parameter {parameter} ({}): {error}{}", .parameter.parameter.name, hint(*.error, .parameter.parameter))]
     Refused {
-        /// Its address.
         slave: u8,
         /// `read` or `change`.
         what: &'static str,
@@ -107,7 +85,6 @@ pub(crate) enum Error {
         "slave {slave} answers the task for parameter {parameter} with {answer}, and the manual prints another answer (3.4.1)"
     )]
     WrongAnswer {
-        /// Its address.
         slave: u8,
         parameter: ParameterRef,
         /// The answer, as the manual writes it.
@@ -116,30 +93,22 @@ pub(crate) enum Error {
     /// A parameter reads differently from what was written.
     #[error("slave {slave}, parameter {parameter} ({}): wrote {}, reads {}", .parameter.parameter.name, .parameter.parameter.show(.parameter.index.element, *.wrote), .parameter.parameter.show(.parameter.index.element, *.reads))]
     Differs {
-        /// Its address.
         slave: u8,
         parameter: ParameterRef,
-        /// What was written.
         wrote: i64,
-        /// What was read.
         reads: i64,
     },
     /// The status word does not show what a control word leads to (NORDAC 3.3).
     #[error("slave {slave}: {expected} expected after STW {stw:04X}, and its status word is {zsw:04X} ({}){}{}", state(*.zsw), remedy(*.zsw, *.stw), stop(expected))]
     NotReached {
-        /// Its address.
         slave: u8,
         /// What was expected, in words.
         expected: &'static str,
-        /// The control word.
         stw: u16,
-        /// The status word.
         zsw: u16,
     },
-    /// The slave has a fault.
     #[error("slave {slave} has a fault{}: remove its cause, then `drivebench acknowledge {slave}`", named(.fault.as_ref()))]
     Fault {
-        /// Its address.
         slave: u8,
         /// Its number (5.7), where the parameter channel tells it.
         fault: Option<i64>,
@@ -148,31 +117,21 @@ pub(crate) enum Error {
     #[error(
         "slave {slave} is under local control, so it ignores control words: `drivebench write {slave} Interface = 2` gives control to the bus (1621)"
     )]
-    Local {
-        /// Its address.
-        slave: u8,
-    },
+    Local { slave: u8 },
     /// A frequency cannot be a setpoint.
     #[error(
         "slave {slave}: a setpoint of {hertz} Hz is out of range: the maximum frequency (1205) is {maximum}, and HSW carries -200 to 200 %"
     )]
     Setpoint {
-        /// Its address.
         slave: u8,
-        /// The frequency.
         hertz: String,
-        /// The maximum frequency.
         maximum: String,
     },
     /// Another master uses the line.
     #[error(
         "station {station} sends as a master on this line: the bench must be the only master, so take the other one off first"
     )]
-    OtherMaster {
-        /// Its address.
-        station: u8,
-    },
-    /// A telegram was not sent.
+    OtherMaster { station: u8 },
     #[error("the line did not take a telegram")]
     NotSent,
     /// The line carries nothing more.
@@ -188,7 +147,7 @@ fn why_not_started(diagnosis: Option<&Diagnosis>, ppo: PpoType) -> String {
     let hint = if diagnosis.has(Diagnosis::CFG_FAULT) {
         format!(
             "; it refuses the configuration {} of {ppo}: its PPO type (1622) is another one",
-            digits(ppo.cfg())
+            hex(ppo.cfg())
         )
     } else if diagnosis.has(Diagnosis::PRM_FAULT) {
         "; it refuses the parameters of Set_Prm".to_owned()
@@ -196,11 +155,6 @@ fn why_not_started(diagnosis: Option<&Diagnosis>, ppo: PpoType) -> String {
         String::new()
     };
     format!("; its diagnosis says {}{hint}", names.join(", "))
-}
-
-fn digits(octets: &[u8]) -> String {
-    let all: Vec<_> = octets.iter().map(|octet| format!("{octet:02X}")).collect();
-    all.join(" ")
 }
 
 fn left(service: Option<&Service>) -> String {

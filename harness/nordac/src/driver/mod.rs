@@ -43,7 +43,6 @@ const START: Span = Span::from_millis(2_000);
 /// How a driver uses its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Options {
-    /// The line.
     pub(crate) timing: Timing,
     /// The watchdog of the slaves: without a request for this long a slave leaves the exchange (EN 2). In steps of 10 ms, up to 650 s.
     pub(crate) watchdog: Span,
@@ -78,7 +77,6 @@ struct Slave {
 /// What a start has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Started {
-    /// The PPO type of the slave.
     pub(crate) ppo: PpoType,
     /// The slave's diagnosis when it began to exchange.
     pub(crate) diagnosis: Option<Diagnosis>,
@@ -99,7 +97,7 @@ pub(crate) struct Driver<'l> {
 
 impl fmt::Debug for Driver<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let slaves: Vec<_> = self.slaves.iter().map(|own| own.address).collect();
+        let slaves: Vec<_> = self.slaves.iter().map(|slave| slave.address).collect();
         f.debug_struct("Driver")
             .field("slaves", &slaves)
             .finish_non_exhaustive()
@@ -129,13 +127,13 @@ impl<'l> Driver<'l> {
     /// Looks at the interlocks that are due, as far as their slaves exchange data. What does not hold is trouble of the line from then on.
     fn look(&mut self) -> Result<(), Error> {
         let now = self.now();
-        if self.interlocks.iter().all(|own| own.next > now) {
+        if self.interlocks.iter().all(|interlock| interlock.next > now) {
             return Ok(());
         }
         // A look reads parameters itself.
         let mut all = std::mem::take(&mut self.interlocks);
-        let seen = all.iter_mut().filter(|own| own.next <= now);
-        let broken = seen.map(|own| self.look_at(own)).find_map(Result::err);
+        let mut seen = all.iter_mut().filter(|interlock| interlock.next <= now);
+        let broken = seen.find_map(|interlock| self.look_at(interlock).err());
         self.interlocks = all;
         match broken {
             Some(Error::Link(trouble)) => {
@@ -146,18 +144,19 @@ impl<'l> Driver<'l> {
         }
     }
 
-    fn look_at(&mut self, own: &mut InverterInterlock) -> Result<(), Error> {
-        own.seen_at(self.now());
-        let Some(parameter) = own.parameter().filter(|_| self.place(own.slave).is_ok()) else {
+    fn look_at(&mut self, interlock: &mut InverterInterlock) -> Result<(), Error> {
+        interlock.seen_at(self.now());
+        let is_started = self.place(interlock.slave).is_ok();
+        let Some(parameter) = interlock.parameter().filter(|_| is_started) else {
             return Ok(());
         };
-        match self.read(own.slave, &parameter) {
-            Ok(number) => match own.broken(number) {
+        match self.read(interlock.slave, &parameter) {
+            Ok(number) => match interlock.broken(number) {
                 Some(why) => Err(Error::Link(Trouble::Interlock(why))),
                 None => Ok(()),
             },
             Err(error @ Error::Link(_)) => Err(error),
-            Err(error) => Err(Error::Link(own.unread(&error.to_string()))),
+            Err(error) => Err(Error::Link(interlock.unread(&error.to_string()))),
         }
     }
 
@@ -194,7 +193,7 @@ impl<'l> Driver<'l> {
 
     /// The slaves that were started.
     pub(crate) fn slaves(&self) -> impl Iterator<Item = u8> {
-        self.slaves.iter().map(|own| own.address)
+        self.slaves.iter().map(|slave| slave.address)
     }
 
     /// The PPO type of a slave, by its configuration (Get_Cfg); needs no start.
@@ -255,7 +254,8 @@ impl<'l> Driver<'l> {
             return Err(Error::OtherDevice { slave, ident });
         }
         let exchanging = !found.has(Diagnosis::NOT_READY);
-        if let Some(master) = found.master.filter(|own| exchanging && *own != MASTER) {
+        let other = found.master.filter(|master| *master != MASTER);
+        if let Some(master) = other.filter(|_| exchanging) {
             return Err(Error::Taken { slave, master });
         }
         let ppo = match ppo {
@@ -298,7 +298,7 @@ impl<'l> Driver<'l> {
         let peripheral = self.peripheral(slave, ppo, Some(&[]));
         let known = {
             let mut all = self.master.iter();
-            all.find(|(_, own)| own.address() == slave)
+            all.find(|(_, peripheral)| peripheral.address() == slave)
                 .map(|(handle, _)| handle)
         };
         let handle = match known {
@@ -308,7 +308,7 @@ impl<'l> Driver<'l> {
             }
             None => self.master.add(peripheral),
         };
-        self.slaves.retain(|own| own.address != slave);
+        self.slaves.retain(|started| started.address != slave);
         self.slaves.push(Slave {
             address: slave,
             handle,
@@ -345,11 +345,8 @@ impl<'l> Driver<'l> {
     /// # Errors
     /// [`Error::NotRunning`].
     pub(crate) fn inputs(&self, slave: u8) -> Result<Image, Error> {
-        let own = &self.slaves[self.place(slave)?];
-        own.exchange
-            .inputs()
-            .copied()
-            .ok_or(Error::NotRunning(slave))
+        let exchange = &self.slaves[self.place(slave)?].exchange;
+        exchange.inputs().copied().ok_or(Error::NotRunning(slave))
     }
 
     /// Sends process words to a slave from now on, and returns the inputs of the first exchange that can show what they led to: the reply to
@@ -360,10 +357,10 @@ impl<'l> Driver<'l> {
     pub(crate) fn exchange(&mut self, slave: u8, words: [u16; 4]) -> Result<Image, Error> {
         let place = self.place(slave)?;
         let under_way = self.wire.awaits() == Some(slave);
-        let own = &mut self.slaves[place];
-        own.exchange.outputs.words[..4].copy_from_slice(&words);
-        let outputs = own.exchange.outputs.encode(own.exchange.ppo());
-        let peripheral = self.master.get_mut(own.handle);
+        let started = &mut self.slaves[place];
+        started.exchange.outputs.words[..4].copy_from_slice(&words);
+        let outputs = started.exchange.outputs.encode(started.exchange.ppo());
+        let peripheral = self.master.get_mut(started.handle);
         peripheral.pi_q_mut().copy_from_slice(&outputs);
         self.cycles(place, if under_way { 3 } else { 2 })
     }
@@ -396,8 +393,8 @@ impl<'l> Driver<'l> {
     /// # Errors
     /// [`Error::NotRunning`].
     pub(crate) fn denied(&self, slave: u8, outputs: &Image) -> Result<Option<String>, Error> {
-        let own = &self.slaves[self.place(slave)?];
-        let data = outputs.encode(own.exchange.ppo());
+        let started = &self.slaves[self.place(slave)?];
+        let data = outputs.encode(started.exchange.ppo());
         let silent = |_: BadTelegram| Error::NotRunning(slave);
         let mut requests = Requests::new(MASTER, slave).map_err(silent)?;
         let request = requests.request(Service::DataExchange, &data);
@@ -407,7 +404,8 @@ impl<'l> Driver<'l> {
     }
 
     fn place(&self, slave: u8) -> Result<usize, Error> {
-        let place = self.slaves.iter().position(|own| own.address == slave);
+        let mut started = self.slaves.iter();
+        let place = started.position(|started| started.address == slave);
         place.ok_or(Error::NotRunning(slave))
     }
 
@@ -426,7 +424,8 @@ impl<'l> Driver<'l> {
     fn settle(&mut self) -> Result<(), Error> {
         while self.wire.awaits().is_some() {
             self.step(Instant::NEVER)?;
-            let waits = self.wire.awaits().and_then(|own| self.place(own).ok());
+            let waits = self.wire.awaits().map(|address| self.place(address));
+            let waits = waits.and_then(Result::ok);
             if let Some(place) = waits {
                 self.exchanges(place)?;
             }
@@ -440,11 +439,11 @@ impl<'l> Driver<'l> {
 
     /// Whether a slave still exchanges data.
     fn exchanges(&mut self, place: usize) -> Result<(), Error> {
-        let own = &self.slaves[place];
-        if own.exchanges == 0 || self.master.get_mut(own.handle).is_running() {
+        let started = &self.slaves[place];
+        if started.exchanges == 0 || self.master.get_mut(started.handle).is_running() {
             return Ok(());
         }
-        let slave = own.address;
+        let slave = started.address;
         self.forget(place);
         Err(Error::Left {
             slave,
@@ -454,13 +453,13 @@ impl<'l> Driver<'l> {
 
     /// Forgets a slave: the master, which starts a lost slave again by itself, is to leave it alone.
     fn forget(&mut self, place: usize) {
-        let own = self.slaves.remove(place);
+        let removed = self.slaves.remove(place);
         if self.slaves.is_empty() {
             self.wire.forget();
             (self.station, self.master) = masters(self.options);
         } else {
-            let idle = self.peripheral(own.address, own.exchange.ppo(), None);
-            *self.master.get_mut(own.handle) = idle;
+            let idle = self.peripheral(removed.address, removed.exchange.ppo(), None);
+            *self.master.get_mut(removed.handle) = idle;
         }
     }
 
@@ -482,7 +481,7 @@ impl<'l> Driver<'l> {
         let Some((handle, event)) = self.master.take_last_events().peripheral else {
             return;
         };
-        let Some(slave) = self.slaves.iter_mut().find(|own| own.handle == handle) else {
+        let Some(slave) = self.slaves.iter_mut().find(|slave| slave.handle == handle) else {
             return;
         };
         if event != PeripheralEvent::DataExchanged {

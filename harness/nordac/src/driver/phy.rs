@@ -20,7 +20,6 @@ use profirust::time;
 /// What a driver needs to know of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Timing {
-    /// The rate of the segment.
     pub(crate) rate: BusRate,
     /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it.
     pub(crate) patience: Span,
@@ -427,8 +426,8 @@ mod tests {
             kept: VecDeque::new(),
         };
         let mut wire = Wire::new(Box::new(slow), timing, 2);
-        let request =
-            Requests::new(2, 8).and_then(|mut own| own.request(Service::DataExchange, &[0]));
+        let request = Requests::new(2, 8)
+            .and_then(|mut requests| requests.request(Service::DataExchange, &[0]));
         let octets = Telegram::Pdu(request.expect("a request")).encode();
         for wait in [200, 400] {
             wire.send(&octets);

@@ -102,7 +102,7 @@ fn parameters_are_read_and_written() {
     ] {
         let found = driver.write(8, &parameter(name), value).expect_err(name);
         assert!(
-            matches!(found, Error::Refused { error: own, .. } if own == error),
+            matches!(found, Error::Refused { error: refusal, .. } if refusal == error),
             "{found}"
         );
         assert!(found.to_string().contains(hint), "{found}");
@@ -165,7 +165,7 @@ fn several_slaves() {
         "{missing}"
     );
     driver.run(Span::from_millis(10)).expect("the others go on");
-    let actual = [8, 9].map(|own| driver.inputs(own).expect("inputs").main());
+    let actual = [8, 9].map(|address| driver.inputs(address).expect("inputs").main());
     assert_eq!(actual, [0x1000, 0x4000]);
     let found = driver.read(9, &parameter("1202")).expect_err("PPO3");
     assert!(
@@ -184,8 +184,8 @@ fn several_slaves() {
 fn a_fault_is_named_and_acknowledged() {
     let mut bench = bench(BusRate::K500, &[slave(8, PpoType::One, &[])]);
     let cause = |on| {
-        let own = Stimulus::Fault(3, on);
-        PlacedFault::Stimulus(8, AnyStimulus::Nordac(own))
+        let stimulus = Stimulus::Fault(3, on);
+        PlacedFault::Stimulus(8, AnyStimulus::Nordac(stimulus))
     };
     bench.inject(
         0,
@@ -284,9 +284,9 @@ fn a_lost_slave_is_left_alone() {
     bench.inject(0, PlacedFault::Drive(8, DriveFault::Off), at(500));
     bench.inject(0, PlacedFault::Drive(8, DriveFault::On), at(600));
     let mut driver = driver(&mut bench, BusRate::K500);
-    for own in [8, 9] {
-        driver.start(own, None).expect("a start");
-        driver.on(own, 0x1000).expect("on");
+    for address in [8, 9] {
+        driver.start(address, None).expect("a start");
+        driver.on(address, 0x1000).expect("on");
     }
     let error = driver.run(Span::from_millis(1_000)).expect_err("8 is off");
     assert!(matches!(error, Error::Left { slave: 8, .. }), "{error}");

@@ -27,7 +27,7 @@ fn telegram(line: &str) -> String {
     let Some(octets) = line.strip_prefix("ask ") else {
         return line.to_owned();
     };
-    let body = octets.split(' ').map(|own| u8::from_str_radix(own, 16));
+    let body = octets.split(' ').map(|octet| u8::from_str_radix(octet, 16));
     let body: Vec<u8> = body.collect::<Result<_, _>>().expect("octets");
     let length = body.len();
     let sum = check_sum(&body);
@@ -54,14 +54,14 @@ fn check(header: &str, steps: &str, deviation: &str) {
         };
         let trace = play(&(before.to_owned() + behind), more);
         let begins = runs(&trace).into_iter().skip(first);
-        let all = begins.map(|own| begun_at(&trace, own.octets[0].at));
-        let all = all.map(|own| judge(&own, &[8], Span::ZERO));
+        let all = begins.map(|run| begun_at(&trace, run.octets[0].at));
+        let all = all.map(|trace| judge(&trace, &[8], Span::ZERO));
         all.collect::<Vec<_>>()
     };
     for right in judged("") {
         let mut doubts = right.doubts;
         // Of the last telegrams alone.
-        doubts.retain(|own| own != "slave 8: no reply of it was compared");
+        doubts.retain(|doubt| doubt != "slave 8: no reply of it was compared");
         assert_eq!((right.breaches, doubts), (Vec::new(), Vec::new()));
     }
     let wrong = judged(&format!("slave 8 deviates {deviation}"));
@@ -149,7 +149,7 @@ fn group() {
     let other = exchange("04 7E", "14 B3");
     for (status, command, end) in [("90", "08", "04"), ("A0", "20", "10"), ("80", "02", "00")] {
         let prm = PRM.replace("80", status);
-        let [begin, end] = [command, end].map(|own| format!("ask FF 82 46 3A 3E {own} 00\n"));
+        let [begin, end] = [command, end].map(|octet| format!("ask FF 82 46 3A 3E {octet} 00\n"));
         let cfg = "ask 88 82 4C 3E 3E F3 F1\n";
         let steps = format!(
             "{prm}\n{cfg}{idle}{idle}{begin}{other}---\n{ready}{ready}{DIAG}\n{end}{ready}{ready}{ready}{other}{other}{other}"
@@ -245,9 +245,9 @@ fn every_begin_of_every_scenario() {
     for source in scenarios() {
         let whole = trace(&source, "");
         let doubts = judge(&whole, &[], Span::ZERO).doubts.len();
-        let begins = runs(&whole).into_iter().flat_map(|own| {
-            let middle = own.octets.len() / 2;
-            [own.octets[0].at, own.octets[middle].at]
+        let begins = runs(&whole).into_iter().flat_map(|run| {
+            let middle = run.octets.len() / 2;
+            [run.octets[0].at, run.octets[middle].at]
         });
         for at in begins.collect::<Vec<_>>() {
             let judged = judge(&begun_at(&whole, at), &[], Span::ZERO);

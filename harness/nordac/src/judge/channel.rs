@@ -64,7 +64,7 @@ impl Tasks {
     /// What is wrong with an answer, and the section; `None` if a right inverter can send it.
     pub(super) fn wrong(&mut self, answer: Pkw) -> Option<(&'static str, String)> {
         let found = self.unlike_all(answer);
-        let same = |own: Pkw| (own.pke, own.ind) == (answer.pke, answer.ind);
+        let same = |pkw: Pkw| (pkw.pke, pkw.ind) == (answer.pke, answer.ind);
         if found.is_none() {
             (self.before, self.earlier) = (None, 0);
             self.answered = Some(answer.number()).filter(|_| answer.ak() != 0);
@@ -87,12 +87,12 @@ impl Tasks {
             let zero = answer == Pkw::default();
             return (!zero).then(|| ("3.4.1", format!("{answer} is no answer, and is not zero")));
         }
-        let of_number = |own: &&Pkw| own.number() == answer.number() && own.ak() != 0;
+        let of_number = |pkw: &&Pkw| pkw.number() == answer.number() && pkw.ak() != 0;
         let mut asked = self.sent.iter().filter(of_number).peekable();
         if asked.peek().is_none() {
             return Some(("3.4.1", format!("{answer} answers no task that was sent")));
         }
-        let asked: Vec<_> = asked.filter(|own| own.ind == answer.ind).collect();
+        let asked: Vec<_> = asked.filter(|task| task.ind == answer.ind).collect();
         if asked.is_empty() {
             return Some(("3.4.2", format!("{answer} carries an IND that no task had")));
         }
@@ -111,7 +111,7 @@ impl Tasks {
         let wrong = |why: &str| Some(("3.4.1", format!("{answer} answers the task {task}: {why}")));
         let parameter = Parameter::of(task.number());
         let (is_long, is_array) =
-            parameter.map_or((false, false), |own| (own.has(Flag::Long), own.is_array()));
+            parameter.map_or((false, false), |row| (row.has(Flag::Long), row.is_array()));
         let kind = match answer.ak() {
             1 => !is_long && matches!(task.ak(), 1..=3),
             2 => is_long && matches!(task.ak(), 1..=3),
@@ -138,7 +138,7 @@ impl Tasks {
         if !kind.is_change() {
             return None;
         }
-        let read_only = parameter.is_some_and(|own| own.has(Flag::ReadOnly));
+        let read_only = parameter.is_some_and(|parameter| parameter.has(Flag::ReadOnly));
         if read_only && task.number() != CONTROL_WORD {
             return wrong("the parameter can only be read");
         }
@@ -162,7 +162,7 @@ impl Tasks {
             (4, None) => &[0, 9],
             (5, None) => &[0, 7],
             (_, None) => &[0],
-            (_, Some(own)) if own.needs_posicon() => &ERRORS,
+            (_, Some(parameter)) if parameter.needs_posicon() => &ERRORS,
             (4, _) => &[9],
             (5, _) => &[7],
             _ => &ERRORS[1..],
@@ -179,11 +179,11 @@ impl Tasks {
 
     /// How many different tasks may change a parameter.
     fn changes(&self, number: u16) -> usize {
-        let loads = |own: &&Pkw| [970, 1602].contains(&own.number());
-        let own = |task: &&Pkw| task.number() == number && task.task().is_change();
+        let loads = |task: &&Pkw| [970, 1602].contains(&task.number());
+        let of_number = |task: &&Pkw| task.number() == number && task.task().is_change();
         self.sent
             .iter()
-            .filter(|task| own(task) || loads(task))
+            .filter(|task| of_number(task) || loads(task))
             .count()
     }
 }
@@ -196,10 +196,10 @@ mod tests {
     /// answer, and an earlier one does not come back.
     #[test]
     fn an_answer_to_an_earlier_task() {
-        let (earlier, own) = (Pkw::of(1, 1801, 0, 7), Pkw::of(1, 1800, 0, 9));
+        let (earlier, later) = (Pkw::of(1, 1801, 0, 7), Pkw::of(1, 1800, 0, 9));
         let mut tasks = Tasks::begun();
         tasks.push(Pkw::of(1, 1800, 0, 0));
-        for answer in [earlier, earlier, own, own] {
+        for answer in [earlier, earlier, later, later] {
             assert_eq!(tasks.wrong(answer), None, "{answer}");
         }
         let again = tasks.wrong(earlier).expect("a difference");

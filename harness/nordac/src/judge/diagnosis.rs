@@ -10,33 +10,33 @@ const ZERO: [u8; 3] = [0xB1, 0xC2, 0xFF];
 
 /// What is wrong with the data of a diagnosis (EN 2); `None` if a right slave can send it.
 pub(super) fn wrong(data: &[u8]) -> Option<String> {
-    let Some(own) = Diagnosis::decode(data) else {
+    let Some(sent) = Diagnosis::decode(data) else {
         return Some(format!(
-            "a diagnosis of {} is sent: 6, or 8 are expected",
+            "a sent of {} is sent: 6, or 8 are expected",
             counted(data.len(), "octet")
         ));
     };
-    let with_master = own.master.is_some();
-    let waits = own.has_mode(Diagnosis::PRM_REQ);
-    let faults = own.has(Diagnosis::PRM_FAULT) || own.has(Diagnosis::CFG_FAULT);
-    let modes = own.has_mode(Diagnosis::WD_ON)
-        || own.has_mode(Diagnosis::FREEZE)
-        || own.has_mode(Diagnosis::SYNC);
-    let ready = !own.has(Diagnosis::NOT_READY);
-    let never = own
+    let with_master = sent.master.is_some();
+    let waits = sent.has_mode(Diagnosis::PRM_REQ);
+    let faults = sent.has(Diagnosis::PRM_FAULT) || sent.has(Diagnosis::CFG_FAULT);
+    let modes = sent.has_mode(Diagnosis::WD_ON)
+        || sent.has_mode(Diagnosis::FREEZE)
+        || sent.has_mode(Diagnosis::SYNC);
+    let ready = !sent.has(Diagnosis::NOT_READY);
+    let never = sent
         .status
         .iter()
         .zip(ZERO)
-        .any(|(own, zero)| own & zero != 0);
-    let extension = match own.extension {
-        None => !own.has(Diagnosis::EXT_DIAG),
-        Some(0) => !own.has(Diagnosis::EXT_DIAG),
-        Some(bits) => bits == 4 && own.has(Diagnosis::EXT_DIAG),
+        .any(|(byte, zero)| byte & zero != 0);
+    let extension = match sent.extension {
+        None => !sent.has(Diagnosis::EXT_DIAG),
+        Some(0) => !sent.has(Diagnosis::EXT_DIAG),
+        Some(bits) => bits == 4 && sent.has(Diagnosis::EXT_DIAG),
     };
     let rules = [
-        (own.ident != IDENT, "the ident number is not 7531"),
+        (sent.ident != IDENT, "the ident number is not 7531"),
         (never, "a bit is 1 that is always 0"),
-        (!own.has_mode(Diagnosis::ALWAYS), "bit 2 of octet 2 is 0"),
+        (!sent.has_mode(Diagnosis::ALWAYS), "bit 2 of octet 2 is 0"),
         (
             waits == with_master,
             "Prm_Req and the address of a master contradict each other",
@@ -54,7 +54,7 @@ pub(super) fn wrong(data: &[u8]) -> Option<String> {
             "Ext_Diag and the extension contradict each other",
         ),
         (
-            own.master.is_some_and(|own| own > 126),
+            sent.master.is_some_and(|master| master > 126),
             "the master has no address",
         ),
     ];

@@ -28,13 +28,13 @@ impl Sender {
     pub(super) fn of_all(runs: &[TelegramRun]) -> Vec<Self> {
         let octets = runs
             .iter()
-            .flat_map(|run| run.octets.iter().map(|own| (run.from, own)));
+            .flat_map(|run| run.octets.iter().map(|octet| (run.from, octet)));
         let octet = octet_time(octets).unwrap_or(Span::ZERO);
         let masters: BTreeSet<u8> = runs.iter().filter_map(master).collect();
         let mut strays = runs.iter().any(begins_with_confirmation);
         let mut all = Vec::with_capacity(runs.len());
         for (place, run) in runs.iter().enumerate() {
-            let before = place.checked_sub(1).and_then(|own| runs.get(own));
+            let before = place.checked_sub(1).and_then(|place| runs.get(place));
             let sender = Self::of(run, (before, runs.get(place + 1)), octet, &masters);
             let confirms = is_confirmation(run);
             strays |= confirms && sender != Self::Known;
@@ -58,22 +58,22 @@ impl Sender {
         }
         // The distance of two ends, in halves of an octet time.
         let nearer = |left: &TelegramRun, right: &TelegramRun, halves: u64| {
-            let begin = right.octets.first().map(|own| own.at);
+            let begin = right.octets.first().map(|octet| octet.at);
             begin.is_some_and(|at| at.since(left.at()).units() * 2 < octet.units() * halves)
         };
         // An octet and its idle time, less half an octet for clocks and for times that are cut off.
         let syn = 2 * (1 + SYN_BITS.div_ceil(OCTET_BITS)) - 1;
-        let of_master = |own: &&TelegramRun| own.from.is_none();
+        let of_master = |run: &&TelegramRun| run.from.is_none();
         if run.from.is_some_and(|from| masters.contains(&from)) {
             Self::Master
         } else if before
             .filter(of_master)
-            .is_some_and(|own| nearer(own, run, 3))
+            .is_some_and(|run_before| nearer(run_before, run, 3))
         {
             Self::NoPauseBefore
         } else if behind
             .filter(of_master)
-            .is_some_and(|own| nearer(run, own, syn))
+            .is_some_and(|run_behind| nearer(run, run_behind, syn))
         {
             Self::NoPauseBehind
         } else {
@@ -101,22 +101,22 @@ impl Sender {
 
 /// The station that sends a request.
 fn master(run: &TelegramRun) -> Option<u8> {
-    let telegram = run.said().filter(|own| own.from.is_none())?.telegram()?;
-    let request = telegram.pdu().filter(|own| own.fc().is_request())?;
+    let telegram = run.said().filter(|said| said.from.is_none())?.telegram()?;
+    let request = telegram.pdu().filter(|request| request.fc().is_request())?;
     Some(request.sa())
 }
 
 fn is_confirmation(run: &TelegramRun) -> bool {
     let said = run.said();
-    said.is_some_and(|own| own.telegram() == Some(Telegram::Confirmation))
+    said.is_some_and(|said| said.telegram() == Some(Telegram::Confirmation))
 }
 
 /// Whether more octets of a master follow a short confirmation without a pause.
 fn begins_with_confirmation(run: &TelegramRun) -> bool {
     let said = run
         .said()
-        .filter(|own| own.from.is_none() && own.octets.len() > 1);
-    let first = said.map(|own| Telegram::decode(&own.octets));
+        .filter(|said| said.from.is_none() && said.octets.len() > 1);
+    let first = said.map(|said| Telegram::decode(&said.octets));
     matches!(
         first,
         Some(Decoded::Value {

@@ -3,7 +3,7 @@
 use super::channel::Tasks;
 use super::diagnosis::{wrong, wrong_status};
 use super::symptom::Symptom::{self, Form, Value};
-use harness_proto::nordac::{IDENT, Image, Pkw, PpoType};
+use harness_proto::nordac::{IDENT, Image, PpoType};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
 use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
@@ -131,7 +131,7 @@ impl Follower {
             return Some(found);
         }
         if function == Function::FdlStatus {
-            let right = matches!(reply, Telegram::Pdu(own) if own.fc().0 == 0);
+            let right = matches!(reply, Telegram::Pdu(pdu) if pdu.fc().0 == 0);
             return (!right).then(|| (Form, "EN 1", "FC 00 is expected".to_owned()));
         }
         if !function.is_srd() {
@@ -141,7 +141,7 @@ impl Follower {
         self.fresh = true;
         if let Some(number) = may_restart(request) {
             self.may_be_set_up();
-            self.restarts = Some(number).filter(|own| self.tasks.answered() != Some(*own));
+            self.restarts = Some(number).filter(|number| self.tasks.answered() != Some(*number));
             if let Record::Counted(_, _, reply) = &mut self.record {
                 *reply = None;
             }
@@ -154,19 +154,19 @@ impl Follower {
         if function.is_sdn() {
             return form("a telegram without acknowledgement is answered");
         }
-        let own = match reply {
+        let reply_pdu = match reply {
             Telegram::Token { .. } => return form("a slave passes no token"),
             Telegram::Confirmation => return None,
-            Telegram::Pdu(own) => own,
+            Telegram::Pdu(pdu) => pdu,
         };
-        if own.sa() != self.address || own.da() != request.sa() {
+        if reply_pdu.sa() != self.address || reply_pdu.da() != request.sa() {
             return form("DA or SA is another one than that of the request asks for");
         }
-        if own.fc().is_request() || own.fc().0 & 0x30 != 0 {
+        if reply_pdu.fc().is_request() || reply_pdu.fc().0 & 0x30 != 0 {
             return form("its FC is none of a slave's reply");
         }
-        let saps = (own.dsap(), own.ssap()) == (request.ssap(), request.dsap());
-        match own.fc().status() {
+        let saps = (reply_pdu.dsap(), reply_pdu.ssap()) == (request.ssap(), request.dsap());
+        match reply_pdu.fc().status() {
             None => form("its FC is none of a slave's reply"),
             Some(Status::DataLow | Status::DataHigh) if !saps => {
                 form("its service access points are not those of the request in the other order")
@@ -177,7 +177,7 @@ impl Follower {
             Some(Status::Ok) if function != Function::FdlStatus => {
                 form("FC 00 replies to FDL status only")
             }
-            Some(Status::Ok | Status::Rs) if own.form() != Shape::Plain => {
+            Some(Status::Ok | Status::Rs) if reply_pdu.form() != Shape::Plain => {
                 form("a reply without data is an SD1 without service access points")
             }
             _ => None,
@@ -192,8 +192,8 @@ impl Follower {
             true => Record::Counted(master, bit, Some(octets.to_vec())),
             false => Record::Nothing,
         };
-        let unknown = |own: &mut Self| {
-            (own.way, own.fresh, own.may_repeat) = (Way::Unknown, false, true);
+        let unknown = |follower: &mut Self| {
+            (follower.way, follower.fresh, follower.may_repeat) = (Way::Unknown, false, true);
             Some(None)
         };
         match std::mem::replace(&mut self.record, now) {
@@ -216,7 +216,7 @@ impl Follower {
         let service = Service::of(request.dsap()).filter(|_| both);
         let confirmed = *reply == Telegram::Confirmation;
         let data = match reply {
-            Telegram::Pdu(own) if !is_refusal(reply) => Some(own.data()),
+            Telegram::Pdu(pdu) if !is_refusal(reply) => Some(pdu.data()),
             _ => None,
         };
         let refused = is_refusal(reply);
@@ -237,8 +237,8 @@ impl Follower {
             },
             Some(Service::GetCfg) => {
                 let cfg = data.and_then(PpoType::from_cfg);
-                let other = matches!(self.way, Way::Configured { ppo: Some(own), .. } if self.exchanging && cfg != Some(own))
-                    || self.shown.is_some_and(|own| cfg != Some(own));
+                let other = matches!(self.way, Way::Configured { ppo: Some(ppo), .. } if self.exchanging && cfg != Some(ppo))
+                    || self.shown.is_some_and(|shown| cfg != Some(shown));
                 self.shown = cfg.filter(|_| self.restarts.is_none());
                 (cfg.is_none() || other).then(|| {
                     (
@@ -250,7 +250,7 @@ impl Follower {
             }
             Some(Service::RdInp | Service::RdOutp) => match data {
                 None if refused => None,
-                Some(data) if PpoType::ALL.iter().any(|own| own.octets() == data.len()) => None,
+                Some(data) if PpoType::ALL.iter().any(|ppo| ppo.octets() == data.len()) => None,
                 _ => Some((
                     Form,
                     "EN 2",
@@ -266,16 +266,16 @@ impl Follower {
         let prm = SetPrm::decode(request.data());
         let locks = prm
             .as_ref()
-            .is_some_and(|own| own.has(SetPrm::LOCK) && !own.has(SetPrm::UNLOCK));
+            .is_some_and(|prm| prm.has(SetPrm::LOCK) && !prm.has(SetPrm::UNLOCK));
         self.way = match (&prm, confirmed) {
-            (Some(own), true) if locks => Way::Parametrised {
+            (Some(prm), true) if locks => Way::Parametrised {
                 master: request.sa(),
-                right: own.ident == IDENT
-                    && own.watchdog_tens_of_ms() != Some(0)
-                    && own.user.is_empty(),
-                watchdog: own.has(SetPrm::WATCHDOG),
+                right: prm.ident == IDENT
+                    && prm.watchdog_tens_of_ms() != Some(0)
+                    && prm.user.is_empty(),
+                watchdog: prm.has(SetPrm::WATCHDOG),
             },
-            (Some(own), true) if own.has(SetPrm::UNLOCK) => Way::Freed(request.sa()),
+            (Some(prm), true) if prm.has(SetPrm::UNLOCK) => Way::Freed(request.sa()),
             // Too short.
             (None, true) => Way::Parametrised {
                 master: request.sa(),
@@ -285,7 +285,7 @@ impl Follower {
             _ => Way::Unknown,
         };
         // Parameters that a slave may take or not (`user-prm`).
-        if prm.is_some_and(|own| !own.user.is_empty()) {
+        if prm.is_some_and(|prm| !prm.user.is_empty()) {
             self.way = Way::Unknown;
         }
         (!confirmed && !refused).then(|| (Form, "EN 2", "a confirmation is expected".to_owned()))
@@ -309,8 +309,8 @@ impl Follower {
                 }
             }
             // The same again leaves the slave where it is.
-            same @ Way::Configured { ppo: own, .. }
-                if confirmed && was_exchanging && own == ppo && ppo.is_some() =>
+            same @ Way::Configured { ppo: known, .. }
+                if confirmed && was_exchanging && known == ppo && ppo.is_some() =>
             {
                 same
             }
@@ -340,7 +340,7 @@ impl Follower {
             return Some((Form, "EN 2", "RS is expected before Chk_Cfg".to_owned()));
         }
         if request.data().len() != data.len()
-            || !PpoType::ALL.iter().any(|own| own.octets() == data.len())
+            || !PpoType::ALL.iter().any(|ppo| ppo.octets() == data.len())
         {
             return Some((
                 Form,
@@ -379,7 +379,7 @@ impl Follower {
         let wrong = tasks.then(|| self.tasks.wrong(image.pkw)).flatten();
         self.restarts = self
             .restarts
-            .filter(|own| self.tasks.answered() != Some(*own));
+            .filter(|number| self.tasks.answered() != Some(*number));
         wrong.map(|(section, why)| (Value, section, why))
     }
 
@@ -388,12 +388,12 @@ impl Follower {
         if let Some(why) = wrong(data) {
             return value(why);
         }
-        let own = Diagnosis::decode(data)?;
-        let waits = own.has_mode(Diagnosis::PRM_REQ);
+        let diagnosis = Diagnosis::decode(data)?;
+        let waits = diagnosis.has_mode(Diagnosis::PRM_REQ);
         if waits {
             (self.exchanging, self.unanswered, self.shown) = (false, None, None);
         }
-        let of = |master: u8| own.master == Some(master);
+        let of = |master: u8| diagnosis.master == Some(master);
         match self.way {
             Way::Waits if !waits => value("Prm_Req is expected before Set_Prm".to_owned()),
             // One that another master has locked takes none of it.
@@ -409,12 +409,12 @@ impl Follower {
                 value("Prm_Req is expected behind what the slave must refuse, or Unlock".to_owned())
             }
             Way::Parametrised { right: false, .. }
-                if self.fresh && waits && !own.has(Diagnosis::PRM_FAULT) =>
+                if self.fresh && waits && !diagnosis.has(Diagnosis::PRM_FAULT) =>
             {
                 value("Prm_Fault is expected behind wrong parameters".to_owned())
             }
             Way::Configured { ppo: None, .. }
-                if self.fresh && waits && !own.has(Diagnosis::CFG_FAULT) =>
+                if self.fresh && waits && !diagnosis.has(Diagnosis::CFG_FAULT) =>
             {
                 value("Cfg_Fault is expected behind a wrong configuration".to_owned())
             }
@@ -422,7 +422,7 @@ impl Follower {
                 right: true,
                 master,
                 ..
-            } if of(master) && !own.has(Diagnosis::NOT_READY) && self.fresh => {
+            } if of(master) && !diagnosis.has(Diagnosis::NOT_READY) && self.fresh => {
                 value("Station_Not_Ready is expected before Chk_Cfg".to_owned())
             }
             Way::Parametrised {
@@ -432,7 +432,7 @@ impl Follower {
             }
             | Way::Configured {
                 master, watchdog, ..
-            } if of(master) && own.has_mode(Diagnosis::WD_ON) != watchdog => {
+            } if of(master) && diagnosis.has_mode(Diagnosis::WD_ON) != watchdog => {
                 value("WD_On is not what Set_Prm has asked for".to_owned())
             }
             _ => None,
@@ -443,17 +443,15 @@ impl Follower {
 /// The number of a task behind which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
 fn may_restart(request: &Pdu) -> Option<u16> {
     let exchanges = Service::of(request.dsap()) == Some(Service::DataExchange);
-    let task = outputs(request.data()).map(|own| own.pkw);
-    let restarts =
-        |own: &Pkw| own.task().is_change() && [970, 1602, 1619, 1622, 1624].contains(&own.number());
-    task.filter(|own| exchanges && restarts(own))
-        .map(|own| own.number())
+    let task = outputs(request.data()).filter(|_| exchanges)?.pkw;
+    let number = Some(task.number()).filter(|_| task.task().is_change());
+    number.filter(|number| [970, 1602, 1619, 1622, 1624].contains(number))
 }
 
 /// The outputs of a Data_Exchange as those of a PPO type that has a parameter channel.
 pub(super) fn outputs(data: &[u8]) -> Option<Image> {
     let mut all = [PpoType::One, PpoType::Two].into_iter();
-    Image::decode(all.find(|own| own.octets() == data.len())?, data)
+    Image::decode(all.find(|ppo| ppo.octets() == data.len())?, data)
 }
 
 /// The PPO type of inputs, where its Chk_Cfg was not heard: a status word is never 0 (3.3), so PZD5 and PZD6 tell PPO 4 from PPO 1.
@@ -469,5 +467,5 @@ fn shown_by(inputs: &[u8]) -> Option<PpoType> {
 
 /// Whether a telegram is RS.
 fn is_refusal(telegram: &Telegram) -> bool {
-    matches!(telegram, Telegram::Pdu(own) if own.fc().status() == Some(Status::Rs))
+    matches!(telegram, Telegram::Pdu(pdu) if pdu.fc().status() == Some(Status::Rs))
 }

@@ -31,7 +31,6 @@ const NO_REQUEST: &str = "octets that are no request";
 /// Something that a slave does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Breach {
-    /// How it differs.
     pub(crate) what: Symptom,
     /// The number of the telegram where it shows, counted from 1 over all stations.
     pub(crate) telegram: usize,
@@ -80,16 +79,16 @@ pub(crate) fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlave
     let mut runs = runs(trace);
     let senders = Sender::of_all(&runs);
     // A telegram that the end of the capture has cut.
-    let cut = runs.pop_if(|own| own.from.is_some() && is_begun(own));
+    let cut = runs.pop_if(|run| run.from.is_some() && is_begun(run));
     let mut judge = Judge {
         midway: true,
         recorded: Some(tolerance),
         standings: standings(&runs, named),
         ..Judge::default()
     };
-    let gaps = gap::gaps(runs.iter().map(|own| (own.begin(), own.at())));
+    let gaps = gap::gaps(runs.iter().map(|run| (run.begin(), run.at())));
     judge.judged.remarks.extend(gap::note(&gaps, "telegram"));
-    judge.gaps = gaps.iter().map(|own| own.piece + 1).collect();
+    judge.gaps = gaps.iter().map(|gap| gap.piece + 1).collect();
     if cut.is_some() {
         let about = "the capture ends in the middle of a reply, which was not compared";
         judge.judged.remarks.push(about.to_owned());
@@ -132,13 +131,13 @@ fn is_undamaged(said: &HeardTelegram) -> bool {
 
 /// Whether octets are the beginning of a telegram.
 fn is_begun(run: &TelegramRun) -> bool {
-    let said = run.said().filter(|own| own.error.is_none());
-    said.is_some_and(|own| matches!(Telegram::decode(&own.octets), Decoded::NeedMore))
+    let said = run.said().filter(|said| said.error.is_none());
+    said.is_some_and(|said| matches!(Telegram::decode(&said.octets), Decoded::NeedMore))
 }
 
 /// The same of octets that stations sent without a pause, from the first telegram of the line on.
 pub(crate) fn judge_runs(runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
-    Judge::default().all_of(runs.into_iter().map(|own| (own, Sender::Known)))
+    Judge::default().all_of(runs.into_iter().map(|run| (run, Sender::Known)))
 }
 
 #[derive(Debug, Default)]
@@ -188,14 +187,14 @@ impl Judge {
     fn begins_again(&mut self) {
         (self.midway, self.asked) = (true, None);
         self.restarted.clear();
-        for (address, own) in &mut self.followers {
-            *own = Follower::new(*address);
+        for (address, follower) in &mut self.followers {
+            *follower = Follower::new(*address);
         }
     }
 
     fn standing(&self, slave: u8) -> Standing {
-        let own = self.standings.get(&slave);
-        own.copied().unwrap_or_default()
+        let standing = self.standings.get(&slave);
+        standing.copied().unwrap_or_default()
     }
 
     fn breach(
@@ -233,17 +232,17 @@ impl Judge {
         }
     }
 
-    /// All followers.
     fn all(&mut self) -> impl Iterator<Item = &mut Follower> {
-        let restarted = self.restarted.values_mut().map(|(_, own)| own);
+        let restarted = self.restarted.values_mut().map(|(_, follower)| follower);
         self.followers.values_mut().chain(restarted)
     }
 
     /// Those of one slave, if it was heard.
     fn of(&mut self, address: u8) -> impl Iterator<Item = &mut Follower> {
-        let restarted = self.restarted.get_mut(&address).map(|(_, own)| own);
-        let own = self.followers.get_mut(&address);
-        own.into_iter().chain(restarted)
+        let restarted = self.restarted.get_mut(&address);
+        let follower = self.followers.get_mut(&address);
+        let restarted = restarted.map(|(_, follower)| follower);
+        follower.into_iter().chain(restarted)
     }
 
     fn follower(&mut self, address: u8) -> &mut Follower {
@@ -252,13 +251,12 @@ impl Judge {
             .or_insert_with(|| Follower::new(address))
     }
 
-    /// A master sends.
     fn asks(&mut self, number: usize, run: &TelegramRun) {
         self.silent();
         let said = run.said();
-        let decoded = said.as_ref().map(|own| Telegram::decode(&own.octets));
-        let whole = |used: usize| said.as_ref().is_some_and(|own| used == own.octets.len());
-        let sound = said.as_ref().is_some_and(|own| own.error.is_none());
+        let decoded = said.as_ref().map(|said| Telegram::decode(&said.octets));
+        let whole = |used: usize| said.as_ref().is_some_and(|said| used == said.octets.len());
+        let sound = said.as_ref().is_some_and(|said| said.error.is_none());
         let (pdu, doubtful) = match decoded {
             Some(Decoded::Value { value, used }) if sound && whole(used) => {
                 (value.pdu().copied(), false)
@@ -275,12 +273,12 @@ impl Judge {
             self.sent(pdu);
         } else {
             // What was damaged may have been heard by some, and what a tap damages by all.
-            self.all().for_each(|own| {
-                own.fresh = false;
+            self.all().for_each(|follower| {
+                follower.fresh = false;
                 if torn {
-                    own.record = Record::Unknown;
-                    own.tasks = Tasks::default();
-                    own.may_be_set_up();
+                    follower.record = Record::Unknown;
+                    follower.tasks = Tasks::default();
+                    follower.may_be_set_up();
                 }
             });
         }
@@ -295,13 +293,14 @@ impl Judge {
     fn sent(&mut self, pdu: &Pdu) {
         let service = Service::of(pdu.dsap());
         if pdu.da() == BROADCAST {
-            self.all().for_each(|own| own.fresh = false);
+            self.all().for_each(|follower| follower.fresh = false);
             return;
         }
         let exchanges = pdu.dsap().is_none() && service == Some(Service::DataExchange);
         self.follower(pdu.da());
         if let Some(image) = outputs(pdu.data()).filter(|_| exchanges) {
-            self.of(pdu.da()).for_each(|own| own.tasks.push(image.pkw));
+            let followers = self.of(pdu.da());
+            followers.for_each(|follower| follower.tasks.push(image.pkw));
         }
     }
 
@@ -321,11 +320,12 @@ impl Judge {
             None => false,
         };
         if !answered || pdu.da() == BROADCAST {
-            let counts = pdu.fc().function().is_some_and(|own| !own.is_sdn());
-            for own in self.of(pdu.da()) {
-                own.fresh = false;
+            let function = pdu.fc().function();
+            let counts = function.is_some_and(|function| !function.is_sdn());
+            for follower in self.of(pdu.da()) {
+                follower.fresh = false;
                 if counts {
-                    own.record = Record::Unknown;
+                    follower.record = Record::Unknown;
                 }
             }
             return;
@@ -380,14 +380,13 @@ impl Judge {
         }
     }
 
-    /// A slave sends.
     fn replies(&mut self, number: usize, run: &TelegramRun) {
         let asked = self.asked.take();
         let Some(said) = run.said() else {
             return;
         };
         let mut octets = run.octets.iter();
-        let damaged = octets.any(|own| own.sent != own.received || own.error.is_some());
+        let damaged = octets.any(|octet| octet.sent != octet.received || octet.error.is_some());
         // A tap may lose an octet.
         let damaged = damaged || self.recorded.is_some() && !is_complete(&said);
         let from = said.from.unwrap_or(0);
@@ -407,8 +406,9 @@ impl Judge {
             self.judged.replies += usize::from(is_judged);
             // On the way to the master: nothing is known of it.
             if let Some(pdu) = &asked.pdu {
-                for own in self.of(pdu.da()) {
-                    (own.record, own.way, own.fresh) = (Record::Unknown, Way::Unknown, false);
+                for follower in self.of(pdu.da()) {
+                    follower.record = Record::Unknown;
+                    (follower.way, follower.fresh) = (Way::Unknown, false);
                 }
             }
             return;
@@ -442,8 +442,8 @@ impl Judge {
             self.judged.replies += usize::from(!may_repeat);
             self.heard.insert(address);
         }
-        let why = found.as_ref().map(|own| &own.2);
-        let why = why.or(shown.as_ref().map(|own| &own.1));
+        let why = found.as_ref().map(|found| &found.2);
+        let why = why.or(shown.as_ref().map(|shown| &shown.1));
         if let Some((silent, restarted)) = self.explained(&request, &said) {
             let Some(why) = why else {
                 self.restarted.insert(address, (silent, restarted));

@@ -62,7 +62,7 @@ struct Shown {
     /// An ident number of its diagnosis that is another one than that of a NORDAC.
     other: Option<u16>,
     /// Its diagnosis has had the ident number of a NORDAC.
-    own: bool,
+    is_nordac: bool,
     /// A master has set it up as a NORDAC.
     set_up: bool,
 }
@@ -72,33 +72,40 @@ pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Stan
     let mut all: BTreeMap<u8, Shown> = BTreeMap::new();
     let mut asked: Option<Pdu> = None;
     for run in runs {
-        let telegram = run.said().and_then(|own| own.telegram());
+        let telegram = run.said().and_then(|said| said.telegram());
         let pdu = telegram.as_ref().and_then(Telegram::pdu).copied();
         let Some(slave) = run.from else {
             asked = pdu;
-            if let Some(own) = pdu.filter(|own| Service::of(own.dsap()) == Some(Service::SetPrm)) {
-                let prm = SetPrm::decode(own.data());
-                let shown = all.entry(own.da()).or_default();
-                shown.set_up |= prm.is_some_and(|own| own.ident == IDENT);
+            if let Some(pdu) = pdu
+                && Service::of(pdu.dsap()) == Some(Service::SetPrm)
+            {
+                let prm = SetPrm::decode(pdu.data());
+                let shown = all.entry(pdu.da()).or_default();
+                shown.set_up |= prm.is_some_and(|prm| prm.ident == IDENT);
             }
             continue;
         };
         let shown = all.entry(slave).or_default();
         let diagnosis =
-            |own: &Pdu| own.da() == slave && Service::of(own.dsap()) == Some(Service::SlaveDiag);
-        if asked.take().is_some_and(|own| diagnosis(&own))
-            && let Some(own) = pdu.and_then(|own| ident(own.data()))
+            |pdu: &Pdu| pdu.da() == slave && Service::of(pdu.dsap()) == Some(Service::SlaveDiag);
+        if asked.take().is_some_and(|request| diagnosis(&request))
+            && let Some(number) = pdu.and_then(|reply| ident(reply.data()))
         {
-            match own == IDENT {
-                true => shown.own = true,
-                false => shown.other = Some(own),
+            match number == IDENT {
+                true => shown.is_nordac = true,
+                false => shown.other = Some(number),
             }
         }
     }
     let standing = |slave: u8, shown: &Shown| match (named.is_empty(), shown) {
         (false, _) if named.contains(&slave) => Standing::Named,
         (false, _) => Standing::NotNamed,
-        (true, Shown { own: true, .. }) => Standing::Known,
+        (
+            true,
+            Shown {
+                is_nordac: true, ..
+            },
+        ) => Standing::Known,
         (
             true,
             Shown {
@@ -118,7 +125,7 @@ pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Stan
     };
     named
         .iter()
-        .for_each(|own| _ = all.entry(*own).or_default());
+        .for_each(|address| _ = all.entry(*address).or_default());
     let all = all.iter();
     all.map(|(slave, shown)| (*slave, standing(*slave, shown)))
         .collect()

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Symptom {
-    /// A reply has other data.
     Value,
     /// A reply is of another kind, or has other addresses, SAPs or length.
     Form,
@@ -18,13 +17,9 @@ pub(crate) enum Symptom {
     NoTelegram,
     /// Octets of a reply have a line error.
     Damaged,
-    /// Another slave has replied.
     Sender,
-    /// A reply is missing.
     Missing,
-    /// A telegram was not asked for.
     Unasked,
-    /// A reply came at another time.
     Time,
 }
 
@@ -58,11 +53,11 @@ impl ReplySubject {
     #[must_use]
     pub(crate) fn of(request: Option<&Telegram>) -> Self {
         let pdu = request.and_then(Telegram::pdu);
-        let function = pdu.and_then(|own| own.fc().function());
+        let function = pdu.and_then(|pdu| pdu.fc().function());
         let (part, section) = match (pdu, function) {
             (None, _) => ("octets that are no request", "EN 1"),
             (Some(_), Some(Function::FdlStatus)) => ("FDL status", "EN 1"),
-            (Some(own), Some(function)) if function.is_srd() => match Service::of(own.dsap()) {
+            (Some(pdu), Some(function)) if function.is_srd() => match Service::of(pdu.dsap()) {
                 Some(service) => (service.name(), section_of(service)),
                 None => ("another service access point", "EN 2"),
             },
@@ -85,7 +80,7 @@ impl ReplySubject {
     ) -> Self {
         let whole = Self::of(request);
         let exchange = wanted.dsap().is_none() && whole.part == Service::DataExchange.name();
-        let both = [wanted, came].map(|own| Image::decode(ppo, own.data()));
+        let both = [wanted, came].map(|pdu| Image::decode(ppo, pdu.data()));
         let [Some(a), Some(b)] = both else {
             return whole;
         };

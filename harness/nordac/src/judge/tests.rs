@@ -29,9 +29,9 @@ const UNSEEN: [&str; 7] = [
 
 pub(super) fn scenarios() -> Vec<Source> {
     let all = sources(&[]).expect("built-in scenarios");
-    let seen = |own: &Source| UNSEEN.iter().all(|word| !own.text.contains(word));
+    let seen = |source: &Source| UNSEEN.iter().all(|word| !source.text.contains(word));
     let all = all.into_iter();
-    all.filter(|own| own.text.contains(BUS) && seen(own))
+    all.filter(|source| source.text.contains(BUS) && seen(source))
         .collect()
 }
 
@@ -60,7 +60,7 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
 /// capture may be the end of a telegram.
 fn behind_a_token(mut trace: Trace) -> Trace {
     let octets = octets(&trace);
-    let octet = octet_time(octets.iter().map(|(from, own)| (*from, own)));
+    let octet = octet_time(octets.iter().map(|(from, octet)| (*from, octet)));
     let octet = octet.unwrap_or(Span::from_micros(22));
     let mut at = Instant::START;
     let token = [0xDC, 0x02, 0x02].map(|byte| {
@@ -70,7 +70,7 @@ fn behind_a_token(mut trace: Trace) -> Trace {
     for channel in &mut trace.channels {
         let from = channel.from;
         let octets = channel.octets_mut().expect("a line of octets");
-        octets.iter_mut().for_each(|own| own.at += octet * 20);
+        octets.iter_mut().for_each(|seen| seen.at += octet * 20);
         if from.is_none() {
             octets.splice(..0, token);
         }
@@ -83,7 +83,7 @@ pub(super) fn begun_at(trace: &Trace, at: Instant) -> Trace {
     let mut trace = trace.clone();
     for channel in &mut trace.channels {
         let octets = channel.octets_mut().expect("a line of octets");
-        octets.retain(|own| own.at >= at);
+        octets.retain(|octet| octet.at >= at);
     }
     trace
 }
@@ -92,13 +92,13 @@ pub(super) fn begun_at(trace: &Trace, at: Instant) -> Trace {
 fn slaves(source: &Source) -> BTreeSet<u8> {
     let lines = source.text.lines();
     let slaves = lines.filter_map(|line| line.strip_prefix("slave ")?.split(' ').next());
-    slaves.filter_map(|own| own.parse().ok()).collect()
+    slaves.filter_map(|address| address.parse().ok()).collect()
 }
 
 /// A line for each slave of a scenario, but for a property that it sets itself.
 fn of_all(source: &Source, line: &str) -> String {
-    let own = line.split(" = ").next().unwrap_or(line);
-    if source.text.contains(own) {
+    let name = line.split(" = ").next().unwrap_or(line);
+    if source.text.contains(name) {
         return String::new();
     }
     slaves(source)
@@ -112,7 +112,7 @@ fn right_slaves(share: usize) -> usize {
     let mut lines = vec![String::new()];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(|own| (*own).to_owned()).collect(),
+            Accepts::Words(words) => words[1..].iter().copied().map(str::to_owned).collect(),
             Accepts::Count { .. } => vec!["1".to_owned(), "4".to_owned()],
         };
         lines.extend(
@@ -159,15 +159,15 @@ fn with_gap(trace: &Trace, place: usize, lost: usize) -> Trace {
     let runs = runs(trace);
     let at = |place: usize| {
         runs.get(place)
-            .map_or(Instant::NEVER, |own| own.octets[0].at)
+            .map_or(Instant::NEVER, |run| run.octets[0].at)
     };
     let (begin, end) = (at(place), at(place + lost));
     let mut trace = trace.clone();
     for channel in &mut trace.channels {
         let octets = channel.octets_mut().expect("a line of octets");
-        octets.retain(|own| own.at < begin || own.at >= end);
-        let later = octets.iter_mut().filter(|own| own.at >= end);
-        later.for_each(|own| own.at += Span::from_millis(3_600_000));
+        octets.retain(|octet| octet.at < begin || octet.at >= end);
+        let later = octets.iter_mut().filter(|octet| octet.at >= end);
+        later.for_each(|octet| octet.at += Span::from_millis(3_600_000));
     }
     trace
 }
@@ -212,7 +212,7 @@ fn a_wrong_slave_is_accused_beside_a_gap() {
             let last = runs(&trace).len().saturating_sub(3);
             let place = if from_end { last } else { 3 };
             let judged = judge(&with_gap(&trace, place, 0), &[], Span::ZERO);
-            let gap = |own: &String| own.starts_with("the log has a gap");
+            let gap = |remark: &String| remark.starts_with("the log has a gap");
             last > 3 && !judged.breaches.is_empty() && judged.remarks.iter().any(gap)
         })
     };
@@ -248,13 +248,13 @@ fn wrong_slaves_are_accused() {
         let named: Vec<_> = slaves(source).into_iter().collect();
         judge(&behind_a_token(trace(source, lines)), &named, Span::ZERO)
     };
-    let doubts = |own: &JudgedSlaves| (own.doubts.len(), own.replies - own.compared);
+    let doubts = |judged: &JudgedSlaves| (judged.doubts.len(), judged.replies - judged.compared);
     let right: Vec<_> = scenarios
         .iter()
-        .map(|own| doubts(&judged(own, "")))
+        .map(|scenario| doubts(&judged(scenario, "")))
         .collect();
     let (mut missed, mut passed) = (Vec::new(), Vec::new());
-    for name in deviations().map(|own| own.name) {
+    for name in deviations().map(|deviation| deviation.name) {
         let mut in_doubt = false;
         let accused = scenarios.iter().zip(&right).any(|(source, right)| {
             let judged = judged(source, &of_all(source, &format!("deviates {name}")));
@@ -298,7 +298,7 @@ fn rules() {
                 .into_iter()
                 .next()
         });
-        let found = found.next().map(|own| own.section);
+        let found = found.next().map(|breach| breach.section);
         assert_eq!(found, Some(section), "{name}");
     }
 }

@@ -53,7 +53,6 @@ struct Known {
     sent: Image,
 }
 
-/// Plays a job.
 pub(super) fn play(
     runner: &mut Runner<'_, Nordac>,
     span: TextSpan,
@@ -114,8 +113,8 @@ fn is_off(zsw: u16) -> bool {
 /// What is kept of a slave; as the header says, where no job has started it.
 fn known<'r>(runner: &'r mut Runner<'_, Nordac>, slave: u8) -> &'r mut Known {
     let setup = &runner.plan.setup;
-    let ppo = setup.slaves.iter().find(|own| own.address == slave);
-    let ppo = ppo.map(|own| own.ppo);
+    let ppo = setup.slaves.iter().find(|setup| setup.address == slave);
+    let ppo = ppo.map(|setup| setup.ppo);
     let known = runner.own.slaves.entry(slave).or_default();
     known.ppo = known.ppo.or(ppo);
     known
@@ -124,7 +123,7 @@ fn known<'r>(runner: &'r mut Runner<'_, Nordac>, slave: u8) -> &'r mut Known {
 impl Known {
     /// Puts a word into what is sent next.
     fn put(&mut self, name: WordName, word: &PlannedWord) {
-        let bytes: Vec<u8> = word.iter().map(|own| own.unwrap_or(0)).collect();
+        let bytes: Vec<u8> = word.iter().map(|byte| byte.unwrap_or(0)).collect();
         match (place(name), <[u8; 2]>::try_from(&bytes[..])) {
             (Some(place), Ok(pair)) => self.sent.words[place] = u16::from_be_bytes(pair),
             _ => self.sent.pkw = bytes.try_into().map(Pkw::decode).unwrap_or_default(),
@@ -159,7 +158,7 @@ fn judge(
     expect: &[(WordName, PlannedWord)],
 ) -> Result<(), Stop> {
     let text = |bytes: &[Option<u8>]| {
-        let digits = bytes.iter().map(|own| match own {
+        let digits = bytes.iter().map(|cell| match cell {
             Some(byte) => format!("{byte:02X}"),
             None => "xx".to_owned(),
         });
@@ -170,7 +169,7 @@ fn judge(
         let same = word
             .iter()
             .zip(&found)
-            .all(|(own, byte)| own.is_none_or(|own| own == *byte));
+            .all(|(wanted, byte)| wanted.is_none_or(|wanted| wanted == *byte));
         if !same {
             let found: Vec<_> = found.into_iter().map(Some).collect();
             let name = word_name(*name, false);
@@ -252,7 +251,6 @@ fn unread(runner: &Runner<'_, Nordac>) -> bool {
     ports.any(|port| port.next < port.received.len())
 }
 
-/// The data of a reply.
 fn data(span: TextSpan, slave: u8, telegram: Telegram, what: &str) -> Result<Buffer, Stop> {
     let wrong = |found: String| {
         let message = format!("slave {slave} answers {what} with {found}");
@@ -429,11 +427,11 @@ fn task(
         return Err(Stop::aborted(span, message));
     }
     // A task that equals the one before is not new. Without a task the answer is zero, and it stands until the next one has come.
-    settled(runner, span, slave, Pkw::default(), |own| own.pke == 0)?;
-    let last = settled(runner, span, slave, task, |own| own.pke != 0)?;
+    settled(runner, span, slave, Pkw::default(), |pkw| pkw.pke == 0)?;
+    let last = settled(runner, span, slave, task, |pkw| pkw.pke != 0)?;
     known(runner, slave).sent.pkw = Pkw::default();
     let same = (last.number(), last.ind) == (task.number(), task.ind);
-    match Answer::of(last).filter(|own| same && *own != Answer::None) {
+    match Answer::of(last).filter(|answer| same && *answer != Answer::None) {
         Some(answer) => Ok(answer),
         None => {
             let message = format!("slave {slave} answers the task {task} with {last}");
@@ -461,7 +459,6 @@ fn settled(
     Ok(last)
 }
 
-/// The value of an answer.
 fn value(span: TextSpan, parameter: &PlannedParameter, answer: Answer) -> Result<u32, Stop> {
     match answer {
         Answer::Error(error) => {

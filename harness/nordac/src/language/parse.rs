@@ -56,7 +56,7 @@ pub(super) fn incomplete(header: &Header) -> Option<Problem> {
 fn rate(scanner: &mut Scanner<'_>) -> Result<BusRate, Problem> {
     let mut ahead = scanner.clone();
     let digits = ahead.take_while(|c| c.is_ascii_digit() || c == '.');
-    let digits = digits.map_or("", |own| own.value);
+    let digits = digits.map_or("", |digits| digits.value);
     let Some(rate) = BusRate::from_name(digits) else {
         let known = BusRate::ALL.map(BusRate::name);
         let expected = format!("a rate in kbit/s ({})", known.join(", "));
@@ -83,7 +83,7 @@ fn master(
     let here = scanner.here();
     let names: Vec<(&str, &'static MasterDeviation)> = MASTER_DEVIATIONS
         .iter()
-        .map(|own| (own.name, own))
+        .map(|deviation| (deviation.name, deviation))
         .collect();
     let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
     let span = scanner.since(here);

@@ -31,7 +31,6 @@ fn inject(link: &mut dyn Link, placed: LineFaultAt) {
     link.inject(0, PlacedFault::Stimulus(0, what), Moment::Now);
 }
 
-/// Plays a step.
 pub(super) fn act(
     runner: &mut Runner<'_, Nordac>,
     act: &PlannedAct,
@@ -52,7 +51,7 @@ pub(super) fn act(
         }
         PlannedAct::Restart(slave) => {
             let faults = [DriveFault::Off, DriveFault::On];
-            let faults = faults.map(|own| PlacedFault::Drive(*slave, own));
+            let faults = faults.map(|fault| PlacedFault::Drive(*slave, fault));
             happen(runner, now, &faults);
         }
         PlannedAct::Outside(slave, stimulus) => {
@@ -95,7 +94,7 @@ fn look(
 ) -> Result<(), Stop> {
     runner.settle();
     let bench = runner.link.beside();
-    let bench = bench.and_then(|own| own.downcast_ref::<Bench>());
+    let bench = bench.and_then(|bench| bench.downcast_ref::<Bench>());
     let Some(bench) = bench else {
         return jobs::read(runner, span, slave, parameter, Some(raw));
     };
@@ -115,9 +114,9 @@ pub(super) fn transmit(link: &mut dyn Link, port: usize, telegrams: &[SentTelegr
             // Octets of the master are counted from the start, so those before must have left.
             while link.busy() && link.wait(Instant::NEVER) {}
             let trace = link.trace(port);
-            let sent = trace.channels.first().map_or(0, |own| {
-                own.octets().iter().filter(|own| own.sent.is_some()).count()
-            });
+            let channel = trace.channels.first().into_iter();
+            let octets = channel.flat_map(|channel| channel.octets());
+            let sent = octets.filter(|octet| octet.sent.is_some()).count();
             for (place, fault) in &telegram.bad {
                 let placed = LineFaultAt {
                     station: Some(simulate::BENCH),
@@ -135,7 +134,7 @@ pub(super) fn transmit(link: &mut dyn Link, port: usize, telegrams: &[SentTelegr
 /// Whether an octet is what is wanted.
 pub(super) fn matches(wanted: &WantedOctet, octet: Received) -> bool {
     let same = match wanted.octet {
-        Expected::Byte(own) => own == octet.byte,
+        Expected::Byte(byte) => byte == octet.byte,
         _ => true,
     };
     same && wanted.error == octet.error
@@ -171,14 +170,14 @@ pub(super) fn complete(runner: &Runner<'_, Nordac>, finding: &mut Mismatch) {
     let octet = runner.link.medium(0).octet_time();
     let mut first = received.len() - 1;
     let mut at = *last;
-    while let Some((earlier, _)) = first.checked_sub(1).and_then(|own| received.get(own)) {
+    while let Some((earlier, _)) = first.checked_sub(1).and_then(|place| received.get(place)) {
         if *earlier + octet != at {
             break;
         }
         at = *earlier;
         first -= 1;
     }
-    let octets = received[first..].iter().map(|(_, own)| show(*own));
+    let octets = received[first..].iter().map(|(_, octet)| show(*octet));
     let octets: Vec<_> = octets.collect();
     let text = format!(" (the last telegram received is {})", octets.join(" "));
     finding.message.push_str(&text);

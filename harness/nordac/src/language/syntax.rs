@@ -25,11 +25,8 @@ pub(crate) struct Header {
 /// A header line about a slave.
 #[derive(Clone, Debug)]
 pub(crate) struct SlaveLine {
-    /// The slave's address.
     pub(crate) slave: Located,
-    /// What the line says.
     pub(crate) what: SetupKind,
-    /// The whole line.
     pub(crate) span: TextSpan,
 }
 
@@ -54,11 +51,9 @@ pub(crate) enum SetupKind {
 /// A parameter and its index.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterName {
-    /// Which parameter.
     pub(crate) which: Which,
     /// What stands behind it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
     pub(crate) index: Vec<Located>,
-    /// Where it stands.
     pub(crate) span: TextSpan,
 }
 
@@ -76,9 +71,7 @@ pub(crate) enum Which {
 /// A value as written.
 #[derive(Clone, Debug)]
 pub(crate) struct WrittenValue {
-    /// What is written.
     pub(crate) kind: ValueKind,
-    /// Where it stands.
     pub(crate) span: TextSpan,
 }
 
@@ -123,7 +116,6 @@ pub(crate) enum Damage {
     Gap(Duration),
 }
 
-/// A step of this bus.
 #[derive(Clone, Debug)]
 pub(crate) enum TelegramStep {
     /// `! slave 8 byte 3: flip 0`.
@@ -191,7 +183,6 @@ pub(crate) enum Outside {
 #[derive(Clone, Debug)]
 pub(crate) struct JobStep {
     pub(crate) slave: Located,
-    /// What is to be done.
     pub(crate) what: JobKind,
 }
 
@@ -253,9 +244,7 @@ pub(crate) enum WordName {
 /// The contents of a word as written.
 #[derive(Clone, Debug)]
 pub(crate) struct WordValue {
-    /// What is written.
     pub(crate) kind: WordKind,
-    /// Where it stands.
     pub(crate) span: TextSpan,
 }
 

@@ -26,7 +26,8 @@ fn played(lines: &str) -> (Verdict, String) {
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
-    let message = outcome.finding.map_or(String::new(), |own| own.message);
+    let message = outcome.finding.map(|finding| finding.message);
+    let message = message.unwrap_or_default();
     (outcome.verdict, message)
 }
 

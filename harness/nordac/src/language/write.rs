@@ -18,26 +18,26 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
         format!("slave {}{blank}{what}", line.slave.expression)
     });
     let master = header.master.as_ref();
-    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    let master = master.map(|deviation| format!("master deviates {}", deviation.value.name));
     (rate.into_iter().collect(), slaves.chain(master).collect())
 }
 
 fn setup(what: &SetupKind) -> String {
     match what {
         SetupKind::There { ppo, posicon } => {
-            let ppo = ppo.map(|own| format!("ppo {}", own.number()));
+            let ppo = ppo.map(|ppo| format!("ppo {}", ppo.number()));
             let posicon = posicon.then(|| "posicon".to_owned());
             let words: Vec<_> = ppo.into_iter().chain(posicon).collect();
             words.join(" ")
         }
         SetupKind::Property(property, word) => format!("property {} = {word}", property.name),
-        SetupKind::Parameter(name, own) => assigned(name, own),
-        SetupKind::Deviates(own) => format!("deviates {}", own.name),
+        SetupKind::Parameter(name, raw) => assigned(name, raw),
+        SetupKind::Deviates(deviation) => format!("deviates {}", deviation.name),
     }
 }
 
-fn assigned(name: &ParameterName, own: &WrittenValue) -> String {
-    format!("parameter {} = {}", parameter(name), value(own))
+fn assigned(name: &ParameterName, raw: &WrittenValue) -> String {
+    format!("parameter {} = {}", parameter(name), value(raw))
 }
 
 fn outside(what: &Outside) -> String {
@@ -46,7 +46,7 @@ fn outside(what: &Outside) -> String {
         Outside::Link(false) => "link lost".to_owned(),
         Outside::Fault { number, on } => {
             let number = number.as_ref();
-            let number = number.map_or(String::new(), |own| format!("{} ", factor(own)));
+            let number = number.map_or(String::new(), |number| format!("{} ", factor(number)));
             format!("fault {number}{}", if *on { "on" } else { "off" })
         }
         Outside::Restart => "restart".to_owned(),
@@ -56,7 +56,7 @@ fn outside(what: &Outside) -> String {
 /// A number as it is; anything else in parentheses.
 fn factor(number: &Located) -> String {
     match number.expression {
-        Expression::Number(own) if own >= 0 => own.to_string(),
+        Expression::Number(number) if number >= 0 => number.to_string(),
         _ => counted(number),
     }
 }
@@ -69,7 +69,7 @@ fn counted(number: &Located) -> String {
 fn parameter(name: &ParameterName) -> String {
     let mut text = match &name.which {
         Which::Numbered(number) => number.to_string(),
-        Which::Named(own) => format!("\"{}\"", own.name),
+        Which::Named(parameter) => format!("\"{}\"", parameter.name),
         Which::Counted(number) => counted(number),
     };
     for part in &name.index {
@@ -95,7 +95,7 @@ pub(super) fn message(message: &Message) -> String {
         match how {
             Damage::Parity => {}
             Damage::Stop => text.push_str(" stop"),
-            Damage::Flip(own) => text.push_str(&format!(" flip{}", flips(*own))),
+            Damage::Flip(bits) => text.push_str(&format!(" flip{}", flips(*bits))),
             Damage::Gap(time) => text.push_str(&format!(" gap {time}")),
         }
     }
@@ -116,18 +116,18 @@ fn flips(flips: Flips) -> String {
 /// Any other step.
 pub(super) fn step(step: &TelegramStep) -> String {
     match step {
-        TelegramStep::Octet(sender, byte, own) => {
+        TelegramStep::Octet(sender, byte, harm) => {
             let number = &byte.expression;
             format!(
                 "! {}byte {number}: {}",
                 self::sender(sender),
-                octet_harm(own)
+                octet_harm(harm)
             )
         }
-        TelegramStep::Telegram(sender, telegram, own) => {
+        TelegramStep::Telegram(sender, telegram, given) => {
             let number = &telegram.expression;
-            let harm = match own {
-                TelegramHarm::Plain(own) => own.to_string(),
+            let harm = match given {
+                TelegramHarm::Plain(harm) => harm.to_string(),
                 TelegramHarm::Delay(time) => format!("delay {time}"),
             };
             format!("! {}telegram {number}: {harm}", self::sender(sender))
@@ -136,12 +136,14 @@ pub(super) fn step(step: &TelegramStep) -> String {
             let what = if *on { "on" } else { "off" };
             format!("! slave {}: {what}", slave.expression)
         }
-        TelegramStep::Outside(slave, own) => format!("slave {} {}", slave.expression, outside(own)),
-        TelegramStep::Quiet => "? quiet".to_owned(),
-        TelegramStep::Parameter(slave, name, own) => {
-            format!("? slave {} {}", slave.expression, assigned(name, own))
+        TelegramStep::Outside(slave, what) => {
+            format!("slave {} {}", slave.expression, outside(what))
         }
-        TelegramStep::Job(own) => job(own),
+        TelegramStep::Quiet => "? quiet".to_owned(),
+        TelegramStep::Parameter(slave, name, raw) => {
+            format!("? slave {} {}", slave.expression, assigned(name, raw))
+        }
+        TelegramStep::Job(step) => job(step),
     }
 }
 
@@ -157,7 +159,7 @@ fn sender(sender: &Sender) -> String {
 fn octet_harm(harm: &OctetHarm) -> String {
     match harm {
         OctetHarm::Delay(time) => format!("delay {time}"),
-        OctetHarm::Plain(own) => own.to_string(),
+        OctetHarm::Plain(harm) => harm.to_string(),
     }
 }
 
@@ -165,8 +167,8 @@ fn job(job: &JobStep) -> String {
     let slave = &job.slave.expression;
     match &job.what {
         JobKind::Start { ppo, watchdog } => {
-            let ppo = ppo.map_or(String::new(), |own| format!(" ppo {}", own.number()));
-            let watchdog = watchdog.map_or(String::new(), |own| format!(" watchdog {own}"));
+            let ppo = ppo.map_or(String::new(), |ppo| format!(" ppo {}", ppo.number()));
+            let watchdog = watchdog.map_or(String::new(), |time| format!(" watchdog {time}"));
             format!("start {slave}{ppo}{watchdog}")
         }
         JobKind::Exchange { send, expect } => {
@@ -180,15 +182,15 @@ fn job(job: &JobStep) -> String {
         JobKind::Read(name, wanted) => {
             let wanted = match wanted {
                 None => String::new(),
-                Some(Wanted::Value(own)) => format!(" = {}", value(own)),
+                Some(Wanted::Value(wanted_value)) => format!(" = {}", value(wanted_value)),
                 Some(Wanted::Error(number)) => format!(" error {}", factor(number)),
             };
             format!("read {slave} {}{wanted}", parameter(name))
         }
-        JobKind::Write(name, own, error) => {
+        JobKind::Write(name, raw, error) => {
             let error = error.as_ref();
-            let error = error.map_or(String::new(), |own| format!(" error {}", factor(own)));
-            format!("write {slave} {} = {}{error}", parameter(name), value(own))
+            let error = error.map_or(String::new(), |number| format!(" error {}", factor(number)));
+            format!("write {slave} {} = {}{error}", parameter(name), value(raw))
         }
         JobKind::On => format!("on {slave}"),
         JobKind::Off => format!("off {slave}"),
@@ -207,7 +209,10 @@ fn words(words: &[(WordName, WordValue)], sent: bool) -> String {
 fn word(value: &WordValue) -> String {
     match &value.kind {
         WordKind::Bytes(bytes) => {
-            let byte = |own: &Option<u8>| own.map_or("xx".to_owned(), |own| format!("{own:02X}"));
+            let byte = |byte: &Option<u8>| match byte {
+                Some(byte) => format!("{byte:02X}"),
+                None => "xx".to_owned(),
+            };
             bytes.iter().map(byte).collect()
         }
         WordKind::Percent(digits, places) => {

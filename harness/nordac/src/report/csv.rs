@@ -10,6 +10,7 @@
 
 use super::words::Reader;
 use harness_bench::capture::runs::said;
+use harness_bench::scenario::run::record::hex;
 use harness_sim::record::Trace;
 use std::io::Write;
 
@@ -21,17 +22,19 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
     writeln!(out, "t_ns,from,to,bytes,error,service,meaning")?;
     for trace in traces {
         let mut reader = Reader::default();
-        for own in said(trace) {
-            let words = reader.read(&own);
-            let from = own.from.map_or("master".to_owned(), |own| own.to_string());
-            let to = words.to.map_or(String::new(), |own| own.to_string());
-            let bytes: String = own.octets.iter().map(|own| format!("{own:02X}")).collect();
-            let error = own.error;
-            let error = error.map_or(String::new(), |(place, error)| format!("{error} {place}"));
+        for said in said(trace) {
+            let words = reader.read(&said);
+            let from = said.from.map(|slave| slave.to_string());
+            let from = from.unwrap_or("master".to_owned());
+            let to = words.to.map(|slave| slave.to_string());
+            let to = to.unwrap_or_default();
+            let bytes = hex(&said.octets);
+            let error = said.error.map(|(place, error)| format!("{error} {place}"));
+            let error = error.unwrap_or_default();
             writeln!(
                 out,
                 "{},{from},{to},{bytes},{error},\"{}\",\"{}\"",
-                own.at.since_start().as_nanos(),
+                said.at.since_start().as_nanos(),
                 words.service,
                 words.meaning.replace('"', "\"\"")
             )?;

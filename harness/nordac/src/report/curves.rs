@@ -36,7 +36,7 @@ pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
             ("HSW", true, &course.setpoints),
             ("HIW", false, &course.actuals),
         ];
-        let drawable = values.into_iter().filter(|own| own.2.len() >= LEAST);
+        let drawable = values.into_iter().filter(|row| row.2.len() >= LEAST);
         let curves: Vec<_> = drawable
             .map(|(name, held, points)| Curve {
                 name: format!("slave {slave} {name}"),
@@ -91,20 +91,20 @@ fn courses(trace: &Trace) -> BTreeMap<u8, Course> {
     let mut courses: BTreeMap<u8, Course> = BTreeMap::new();
     for said in said(trace) {
         reader.read(&said);
-        let Some(own) = reader.exchanged(&said) else {
+        let Some(exchanged) = reader.exchanged(&said) else {
             continue;
         };
-        let course = courses.entry(own.slave).or_default();
+        let course = courses.entry(exchanged.slave).or_default();
         let at = said.at.since_start().as_millis_f64();
-        let percent = f64::from(own.image.main().cast_signed()) * 100.0 / FULL;
-        if !own.of_slave {
-            if own.image.first() & stw::VALID != 0 {
+        let percent = f64::from(exchanged.image.main().cast_signed()) * 100.0 / FULL;
+        if !exchanged.of_slave {
+            if exchanged.image.first() & stw::VALID != 0 {
                 course.setpoints.push((at, percent));
             }
             continue;
         }
         course.actuals.push((at, percent));
-        if let Some(state) = State::of_zsw(own.image.first())
+        if let Some(state) = State::of_zsw(exchanged.image.first())
             && course.states.last().is_none_or(|(_, last)| *last != state)
         {
             course.states.push((said.at, state));
@@ -140,12 +140,12 @@ mod tests {
                 let pair = std::str::from_utf8(pair).expect("digits");
                 let byte = Some(u8::from_str_radix(pair, 16).expect("a byte"));
                 let octet = LineByte::seen(at, byte, byte, None);
-                let own = if from.is_some() {
+                let octets = if from.is_some() {
                     &mut slave
                 } else {
                     &mut master
                 };
-                own.push(octet);
+                octets.push(octet);
             }
         }
         let trace = Trace {
@@ -157,10 +157,12 @@ mod tests {
         };
         let courses = courses(&trace);
         let course = &courses[&8];
-        let states: Vec<_> = course.states.iter().map(|(_, own)| own.short()).collect();
+        let states = course.states.iter().map(|(_, state)| state.short());
+        let states: Vec<_> = states.collect();
         assert_eq!(states, ["SD", "RDY", "OE"]);
         // The setpoint of the word that is not valid does not count.
-        let setpoints: Vec<_> = course.setpoints.iter().map(|(_, own)| *own).collect();
+        let setpoints = course.setpoints.iter().map(|(_, value)| *value);
+        let setpoints: Vec<_> = setpoints.collect();
         assert_eq!(setpoints, [0.0, 50.0]);
         assert_eq!(course.actuals.len(), 3);
         assert!(curves(&mut Html::new(), "a", &trace));

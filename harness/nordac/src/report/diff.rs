@@ -2,6 +2,7 @@
 
 use super::table::station;
 use super::words::Reader;
+use crate::value::hex;
 use harness_bench::capture::runs::{HeardTelegram, said};
 use harness_bench::counted::counted;
 use harness_proto::time::Span;
@@ -45,18 +46,18 @@ pub(crate) fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> Tr
 /// The telegram at a place, as a row of the table.
 fn words(all: &[HeardTelegram], place: usize) -> String {
     let mut reader = Reader::default();
-    let mut read = all.iter().map(|own| (own, reader.read(own)));
-    let Some((own, words)) = read.nth(place) else {
+    let mut read = all.iter().map(|telegram| (telegram, reader.read(telegram)));
+    let Some((telegram, words)) = read.nth(place) else {
         return "no more telegrams".to_owned();
     };
-    let octets: Vec<_> = own.octets.iter().map(|own| format!("{own:02X}")).collect();
+
     format!(
         "{} at {}: {} {} [{}]",
-        station(own.from),
-        own.at,
+        station(telegram.from),
+        telegram.at,
         words.service,
         words.meaning,
-        octets.join(" ")
+        hex(&telegram.octets)
     )
 }
 
@@ -95,8 +96,8 @@ mod tests {
     fn trace(start: u64, octets: &[u8]) -> Trace {
         let at = |place: usize| Instant::START + Span::from_micros(start + 22 * place as u64);
         let octets = octets.iter().enumerate();
-        let octets =
-            octets.map(|(place, own)| LineByte::seen(at(place), Some(*own), Some(*own), None));
+        let octets = octets
+            .map(|(place, octet)| LineByte::seen(at(place), Some(*octet), Some(*octet), None));
         Trace {
             channels: vec![Channel::of_octets(None, None, octets.collect())],
             ..Trace::empty(1)

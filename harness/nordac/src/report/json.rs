@@ -20,7 +20,6 @@ use harness_sim::record::Trace;
 use serde::{Serialize, Serializer};
 use std::io::Write;
 
-/// The version of the form.
 pub(crate) const SCHEMA: u32 = 2;
 
 #[derive(Serialize)]
@@ -64,20 +63,20 @@ pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std:
     let bytes = traces
         .iter()
         .flat_map(octets)
-        .map(|(from, own)| OctetObject {
-            t_ns: own.at.since_start().as_nanos(),
+        .map(|(from, octet)| OctetObject {
+            t_ns: octet.at.since_start().as_nanos(),
             from,
-            sent: own.sent,
-            received: own.received,
-            error: match (own.received, own.error) {
+            sent: octet.sent,
+            received: octet.received,
+            error: match (octet.received, octet.error) {
                 (None, _) => Some("dropped"),
-                (Some(_), error) => error.map(|own| own.name()),
+                (Some(_), error) => error.map(|error| error.name()),
             },
         });
-    let telegrams = traces.iter().flat_map(said).map(|own| TelegramObject {
-        t_ns: own.at.since_start().as_nanos(),
-        from: own.from,
-        bytes: own.octets,
+    let telegrams = traces.iter().flat_map(said).map(|telegram| TelegramObject {
+        t_ns: telegram.at.since_start().as_nanos(),
+        from: telegram.from,
+        bytes: telegram.octets,
     });
     let object = Object {
         schema: SCHEMA,

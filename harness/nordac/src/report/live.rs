@@ -22,9 +22,9 @@ impl LiveText for TelegramText {
             octets: octets.clone(),
         };
         let said = run.said().into_iter();
-        let lines = said.map(|own| {
-            let words = self.reader.read(&own);
-            (own.at.since_start().as_nanos(), row(&own, &words))
+        let lines = said.map(|telegram| {
+            let words = self.reader.read(&telegram);
+            (telegram.at.since_start().as_nanos(), row(&telegram, &words))
         });
         lines.collect()
     }

@@ -24,7 +24,7 @@ struct Folded {
 /// Writes the picture; false where there is nothing to draw.
 pub(crate) fn sequence(html: &mut Html, id: &str, title: &str, trace: &Trace) -> bool {
     let folded = folded(trace);
-    let senders = folded.iter().filter_map(|own| own.said.from);
+    let senders = folded.iter().filter_map(|row| row.said.from);
     let slaves: BTreeSet<u8> = senders.collect();
     let slaves: Vec<_> = slaves.into_iter().collect();
     let arrows = folded.iter().map(drawn);

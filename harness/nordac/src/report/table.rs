@@ -1,6 +1,7 @@
 //! A trace as a table: a row a telegram.
 
 use super::words::{Reader, Words};
+use crate::value::hex;
 use harness_bench::capture::runs::{HeardTelegram, said};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
@@ -12,7 +13,7 @@ pub(crate) fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option
     let mut reader = Reader::default();
     let rows = said(trace)
         .into_iter()
-        .map(|own| line(&own, &reader.read(&own)));
+        .map(|telegram| line(&telegram, &reader.read(&telegram)));
     let rows: Vec<_> = rows.collect();
     let wanted = wanted.unwrap_or(0..rows.len());
     let rows = &rows[wanted.start.min(rows.len())..wanted.end.min(rows.len())];
@@ -34,7 +35,7 @@ pub(crate) fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option
 
 /// The name of a station in a row.
 pub(super) fn station(slave: Option<u8>) -> String {
-    slave.map_or("master".to_owned(), |own| format!("slave {own}"))
+    slave.map_or("master".to_owned(), |address| format!("slave {address}"))
 }
 
 fn line(said: &HeardTelegram, words: &Words) -> String {
@@ -49,12 +50,12 @@ pub(super) fn row(said: &HeardTelegram, words: &Words) -> String {
         (Some(_), Some(to)) => to.to_string(),
         (_, None) => String::new(),
     };
-    let octets: Vec<_> = said.octets.iter().map(|own| format!("{own:02X}")).collect();
+
     format!(
         "{:<9} {to:<9} {:<14} {}  [{}]",
         station(said.from),
         words.service,
         words.meaning,
-        octets.join(" "),
+        hex(&said.octets),
     )
 }

@@ -18,7 +18,7 @@ pub(crate) fn write(traces: &[Trace], signals: Signals, out: &mut dyn Write) -> 
     let wires = channels.enumerate().map(|(place, channel)| DrawnLine {
         name: channel
             .from
-            .map_or("master".to_owned(), |own| format!("drive_{own}")),
+            .map_or("master".to_owned(), |slave| format!("drive_{slave}")),
         place,
         channel,
         states: None,

@@ -1,12 +1,13 @@
 //! What telegrams say, in words: service, diagnosis, process words, parameter channel.
 
+use crate::value::hex;
 use harness_bench::capture::runs::HeardTelegram;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::{State, ZSW, stw, zsw};
 use harness_proto::nordac::{Answer, Image, Parameter, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service, SetPrm};
 use harness_proto::profibus::fdl::Status;
-use harness_proto::profibus::{Buffer, Pdu, Telegram};
+use harness_proto::profibus::{Pdu, Telegram};
 use std::collections::BTreeMap;
 
 /// Bits of the status of Set_Prm by name; the watchdog is shown with its time.
@@ -41,7 +42,6 @@ pub(crate) struct ProcessImage {
     pub(crate) slave: u8,
     /// Whether they are the slave's inputs, rather than what the master sent.
     pub(crate) of_slave: bool,
-    /// The words.
     pub(crate) image: Image,
 }
 
@@ -52,7 +52,6 @@ pub(crate) struct Words {
     pub(crate) to: Option<u8>,
     /// The service, or the kind of telegram.
     pub(crate) service: String,
-    /// What it says.
     pub(crate) meaning: String,
 }
 
@@ -68,7 +67,10 @@ impl Reader {
         }
         match said.telegram() {
             Some(Telegram::Confirmation) => Words {
-                service: self.asked.map_or("SC", |(_, own)| own.name()).to_owned(),
+                service: self
+                    .asked
+                    .map_or("SC", |(_, asked)| asked.name())
+                    .to_owned(),
                 meaning: "confirmed".to_owned(),
                 ..Words::default()
             },
@@ -112,15 +114,15 @@ impl Reader {
         if let Some(function) = pdu.fc().function() {
             let service = Service::of(pdu.dsap());
             let known = service.filter(|_| function.is_srd() || function.is_sdn());
-            self.asked = known.map(|own| (pdu.da(), own));
+            self.asked = known.map(|service| (pdu.da(), service));
             return Words {
                 to,
                 service: known.map_or(function.name(), Service::name).to_owned(),
-                meaning: known.map_or(String::new(), |own| self.request(own, pdu)),
+                meaning: known.map_or(String::new(), |service| self.request(service, pdu)),
             };
         }
         let asked = self.asked.filter(|(slave, _)| *slave == pdu.sa());
-        let service = asked.map(|(_, own)| own);
+        let service = asked.map(|(_, service)| service);
         let name = service.map_or("FDL status", Service::name).to_owned();
         let meaning = match (pdu.fc().status(), service) {
             (Some(Status::Ok), _) => "OK".to_owned(),
@@ -147,7 +149,7 @@ impl Reader {
         let data = pdu.data();
         match service {
             Service::SetPrm => {
-                SetPrm::decode(data).map_or_else(|| hex(data), |own| parameters(&own))
+                SetPrm::decode(data).map_or_else(|| hex(data), |prm| parameters(&prm))
             }
             Service::ChkCfg => match PpoType::from_cfg(data) {
                 Some(ppo) => {
@@ -157,7 +159,7 @@ impl Reader {
                 None => hex(data),
             },
             Service::GlobalControl => {
-                GlobalControl::decode(data).map_or_else(|| hex(data), |own| commands(&own))
+                GlobalControl::decode(data).map_or_else(|| hex(data), |control| commands(&control))
             }
             Service::DataExchange => match self.image(slave, data) {
                 Some((ppo, image)) => {
@@ -176,7 +178,7 @@ impl Reader {
         let data = pdu.data();
         match service {
             Service::SlaveDiag => {
-                Diagnosis::decode(data).map_or_else(|| hex(data), |own| diagnosis(&own))
+                Diagnosis::decode(data).map_or_else(|| hex(data), |answer| diagnosis(&answer))
             }
             Service::GetCfg => {
                 PpoType::from_cfg(data).map_or_else(|| hex(data), |ppo| ppo.to_string())
@@ -198,14 +200,10 @@ impl Reader {
         let known = self.types.get(&slave).copied();
         let fits = PpoType::ALL
             .into_iter()
-            .find(|own| own.octets() == data.len());
-        let ppo = known.filter(|own| own.octets() == data.len()).or(fits)?;
+            .find(|ppo| ppo.octets() == data.len());
+        let ppo = known.filter(|ppo| ppo.octets() == data.len()).or(fits)?;
         Some((ppo, Image::decode(ppo, data)?))
     }
-}
-
-fn hex(data: &[u8]) -> String {
-    Buffer::of(data).map_or(String::new(), |own| own.to_string())
 }
 
 fn joined(words: String, pkw: Option<String>) -> String {
@@ -256,14 +254,15 @@ fn control(word: u16) -> String {
         (is(stw::CLOCKWISE), "clockwise"),
         (is(stw::ANTICLOCKWISE), "anticlockwise"),
     ];
-    words.extend(more.into_iter().filter(|(so, _)| *so).map(|(_, own)| own));
+    words.extend(more.into_iter().filter(|(so, _)| *so).map(|(_, word)| word));
     in_set(words.join(", "), word)
 }
 
 /// The state that a status word shows, and its other bits (3.2.2).
 fn status(word: u16) -> String {
     let state = State::of_zsw(word).map_or("no state", State::short);
-    let shown = State::ALL.into_iter().fold(0, |all, own| all | own.bits());
+    let states = State::ALL.into_iter();
+    let shown = states.fold(0, |all, state| all | state.bits());
     let others = ZSW.iter().filter(|bit| {
         let set = word & !shown & !(zsw::NO_OFF2 | zsw::NO_OFF3) & 0x3FFF;
         set >> bit.number & 1 == 1
@@ -290,7 +289,7 @@ fn in_set(text: String, word: u16) -> String {
 /// A parameter with its name and its index.
 fn named(pkw: Pkw) -> String {
     let number = pkw.number();
-    let name = Parameter::of(number).map_or("", |own| own.name);
+    let name = Parameter::of(number).map_or("", |parameter| parameter.name);
     let index = match pkw.ind {
         0 => String::new(),
         ind => format!(" IND {ind:04X}"),
@@ -338,47 +337,47 @@ fn value(pkw: Pkw, raw: u32) -> String {
     }
 }
 
-fn parameters(own: &SetPrm<'_>) -> String {
-    let set = PRM.into_iter().filter(|(bit, _)| own.has(*bit));
+fn parameters(prm: &SetPrm<'_>) -> String {
+    let set = PRM.into_iter().filter(|(bit, _)| prm.has(*bit));
     let mut words: Vec<_> = set.map(|(_, name)| name.to_owned()).collect();
-    if let Some(tens) = own.watchdog_tens_of_ms() {
+    if let Some(tens) = prm.watchdog_tens_of_ms() {
         words.push(format!("watchdog {} ms", u32::from(tens) * 10));
     }
     words.push(format!(
         "min T_SDR {}, ident {:04X}",
-        own.min_tsdr, own.ident
+        prm.min_tsdr, prm.ident
     ));
-    if own.group != 0 {
-        words.push(format!("groups {:02X}", own.group));
+    if prm.group != 0 {
+        words.push(format!("groups {:02X}", prm.group));
     }
-    if !own.user.is_empty() {
-        words.push(format!("user data {}", hex(own.user)));
+    if !prm.user.is_empty() {
+        words.push(format!("user data {}", hex(prm.user)));
     }
     words.join(", ")
 }
 
-fn commands(own: &GlobalControl) -> String {
-    let set = CONTROL.into_iter().filter(|(bit, _)| own.has(*bit));
+fn commands(control: &GlobalControl) -> String {
+    let set = CONTROL.into_iter().filter(|(bit, _)| control.has(*bit));
     let names: Vec<_> = set.map(|(_, name)| name).collect();
     let names = if names.is_empty() {
         "operate".to_owned()
     } else {
         names.join(" ")
     };
-    match own.group {
+    match control.group {
         0 => names,
         group => format!("{names}, groups {group:02X}"),
     }
 }
 
-fn diagnosis(own: &Diagnosis) -> String {
-    let mut words: Vec<_> = own.names().map(str::to_owned).collect();
-    words.push(match own.master {
+fn diagnosis(answer: &Diagnosis) -> String {
+    let mut words: Vec<_> = answer.names().map(str::to_owned).collect();
+    words.push(match answer.master {
         Some(master) => format!("master {master}"),
         None => "no master".to_owned(),
     });
-    words.push(format!("ident {:04X}", own.ident));
-    if let Some(bits) = own.extension {
+    words.push(format!("ident {:04X}", answer.ident));
+    if let Some(bits) = answer.extension {
         words.push(format!("device block {bits:02X}"));
     }
     words.join(", ")

@@ -24,7 +24,7 @@ impl HeldBefore {
         let slaves = session.slaves().to_vec();
         let rate = session.rig().port().map(rate).unwrap_or_default();
         let gate = session.guarded().slaves();
-        let limits = gate.map_or_else(Limits::default, |own| *own.limits());
+        let limits = gate.map_or_else(Limits::default, |gate| *gate.limits());
         let nothing = (Vec::new(), false);
         let mut player = Player::of(slaves.clone(), rate, session.patience(), limits, nothing);
         let mut talk = session.talk();
@@ -54,8 +54,8 @@ impl HeldBefore {
         telegrams: impl Iterator<Item = &'t [u8]>,
     ) -> Result<Option<String>, TalkError> {
         let all: Vec<_> = telegrams.flat_map(changes).collect();
-        let mut types = all.iter().filter(|own| own.1.number() == PPO_TYPE);
-        if let Some((slave, task)) = types.find(|own| !has_channel(own.1)) {
+        let mut types = all.iter().filter(|change| change.1.number() == PPO_TYPE);
+        if let Some((slave, task)) = types.find(|change| !has_channel(change.1)) {
             let value = task.low_word();
             return Ok(Some(format!(
                 "with {PPO_TYPE} = {value} slave {slave} may have no parameter channel, by which it is put back"

@@ -32,7 +32,7 @@ pub(crate) struct InverterInterlock {
     pub(crate) slave: u8,
     cell: Cell,
     condition: PortCondition<i64>,
-    own: Interlock,
+    interlock: Interlock,
     every: Span,
     /// On the clock of the driver.
     pub(crate) next: Instant,
@@ -42,13 +42,13 @@ pub(crate) struct InverterInterlock {
 ///
 /// # Errors
 /// What is wrong with it.
-pub(super) fn checked(own: &Interlock) -> Result<(), Mistake> {
-    InverterInterlock::read(own).map(|_| ())
+pub(super) fn checked(interlock: &Interlock) -> Result<(), Mistake> {
+    InverterInterlock::read(interlock).map(|_| ())
 }
 
 impl InverterInterlock {
-    fn read(own: &Interlock) -> Result<Self, Mistake> {
-        let name = own.parameter.clone().unwrap_or_default();
+    fn read(interlock: &Interlock) -> Result<Self, Mistake> {
+        let name = interlock.parameter.clone().unwrap_or_default();
         let wrong = |message| {
             let expected =
                 "ZSW, HIW, PZD4, or a parameter of `drivebench cells --bus nordac`, expected here";
@@ -56,23 +56,23 @@ impl InverterInterlock {
         };
         let found = cells(std::slice::from_ref(&name)).map_err(wrong)?;
         let cell = match found[..] {
-            [Cell::Parameter(own)] if own.parameter.number == STATUS_WORD => {
+            [Cell::Parameter(parameter)] if parameter.parameter.number == STATUS_WORD => {
                 Cell::Word(ReplyWord::Status)
             }
             [cell] => cell,
             _ => return Err(wrong("an interlock looks at one thing".to_owned())),
         };
         let bits: Vec<_> = match cell {
-            Cell::Word(ReplyWord::Status) => ZSW.iter().map(|own| (own.number, own.name)).collect(),
+            Cell::Word(ReplyWord::Status) => ZSW.iter().map(|bit| (bit.number, bit.name)).collect(),
             _ => Vec::new(),
         };
-        let condition = own.condition_of("parameter", &bits, |text| bound(text, cell))?;
-        let every = u64::try_from(own.every.0.as_nanos()).unwrap_or(u64::MAX);
+        let condition = interlock.condition_of("parameter", &bits, |text| bound(text, cell))?;
+        let every = u64::try_from(interlock.every.0.as_nanos()).unwrap_or(u64::MAX);
         Ok(Self {
-            slave: own.drive,
+            slave: interlock.drive,
             cell,
             condition,
-            own: own.clone(),
+            interlock: interlock.clone(),
             every: Span::from_nanos(every),
             next: Instant::START,
         })
@@ -81,20 +81,20 @@ impl InverterInterlock {
     /// Those of a rig's file, which was checked.
     fn all(rig: &Rig) -> Vec<Self> {
         let all = rig.file.interlock.iter();
-        all.filter_map(|own| Self::read(own).ok()).collect()
+        all.flat_map(Self::read).collect()
     }
 
     /// Those that a driver has to read: on parameters.
     pub(crate) fn parameters(rig: &Rig) -> Vec<Self> {
         let mut all = Self::all(rig);
-        all.retain(|own| own.parameter().is_some());
+        all.retain(|interlock| interlock.parameter().is_some());
         all
     }
 
     /// The parameter, if it is on one.
     pub(crate) const fn parameter(&self) -> Option<ParameterRef> {
         match self.cell {
-            Cell::Parameter(own) => Some(own),
+            Cell::Parameter(parameter) => Some(parameter),
             Cell::Word(_) => None,
         }
     }
@@ -106,14 +106,17 @@ impl InverterInterlock {
 
     /// Why it cannot be read.
     pub(crate) fn unread(&self, why: &str) -> Trouble {
-        let words = self.own.words(&self.cell.name());
+        let words = self.interlock.words(&self.cell.name());
         Trouble::Lost(format!("{words} cannot be read: {why}"))
     }
 
     /// Why it does not hold where this was read; `None` if it does.
     pub(crate) fn broken(&self, number: i64) -> Option<String> {
         let read = match self.cell {
-            Cell::Parameter(own) => own.parameter.show(own.index.element, number).to_string(),
+            Cell::Parameter(named) => {
+                let element = named.index.element;
+                named.parameter.show(element, number).to_string()
+            }
             Cell::Word(ReplyWord::Actual) => {
                 let word = word_of(number);
                 format!("{} ({word:04X})", percentage(word))
@@ -121,13 +124,16 @@ impl InverterInterlock {
             Cell::Word(ReplyWord::Status) => format!("{:04X}", word_of(number)),
             Cell::Word(ReplyWord::Second) => number.to_string(),
         };
-        let why = self.own.broken(
+        let why = self.interlock.broken(
             &self.condition,
             word_of(number).into(),
             &read,
             |min, max| min.is_none_or(|min| *min <= number) && max.is_none_or(|max| number <= *max),
         )?;
-        Some(format!("{}: {why}", self.own.words(&self.cell.name())))
+        Some(format!(
+            "{}: {why}",
+            self.interlock.words(&self.cell.name())
+        ))
     }
 
     /// Why it does not hold in the inputs of an exchange; `None` if it does, or if it is on a parameter.
@@ -151,9 +157,9 @@ const fn word_of(number: i64) -> u16 {
 /// Reads a bound, in the numbers of a word or a parameter.
 fn bound(text: &str, cell: Cell) -> Result<i64, (String, String)> {
     let (read, expected) = match cell {
-        Cell::Parameter(own) => {
-            let read = own.parameter.parse(own.index.element, text);
-            let unit = own.parameter.unit_of(own.index.element).name;
+        Cell::Parameter(parameter) => {
+            let read = parameter.parameter.parse(parameter.index.element, text);
+            let unit = parameter.parameter.unit_of(parameter.index.element).name;
             let expected = match unit {
                 "" => "a number in quotes expected here".to_owned(),
                 unit => format!("a number in {unit} expected here"),
@@ -183,7 +189,6 @@ fn bound(text: &str, cell: Cell) -> Result<i64, (String, String)> {
     read.ok_or_else(|| (format!("`{text}` is no bound of {}", cell.name()), expected))
 }
 
-/// The interlocks of a rig.
 #[derive(Debug)]
 pub(super) struct InverterInterlocks {
     all: Vec<InverterInterlock>,
@@ -219,38 +224,40 @@ impl Watch for InverterInterlocks {
     fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), Trouble> {
         self.heard.clear();
         let mut talk = Talk::new(Box::new(line), self.patience);
-        for own in &self.all {
-            let slave = self.slaves.iter().find(|slave| slave.address == own.slave);
+        for interlock in &self.all {
+            let address = interlock.slave;
+            let mut slaves = self.slaves.iter();
+            let slave = slaves.find(|slave| slave.address == address);
             let Some(slave) = slave else { continue };
             let known = Known::new(*slave);
-            talk.restart(own.slave);
-            let number = match own.parameter() {
+            talk.restart(interlock.slave);
+            let number = match interlock.parameter() {
                 Some(own_parameter) if known.ppo().has_pkw() => {
                     let parameter = own_parameter.parameter;
                     let ind = own_parameter.ind();
                     let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
-                    let started = talk.start(own.slave, known.ppo(), None);
+                    let started = talk.start(interlock.slave, known.ppo(), None);
                     let raw = started.and_then(|()| known.task(&mut talk, task));
-                    let raw = raw.map_err(|error| own.unread(&error.to_string()))?;
-                    let raw = raw.ok_or_else(|| own.unread("the inverter refuses it"))?;
+                    let raw = raw.map_err(|error| interlock.unread(&error.to_string()))?;
+                    let raw = raw.ok_or_else(|| interlock.unread("the inverter refuses it"))?;
                     parameter.number_of(raw)
                 }
                 Some(_) => {
                     let why = format!("{} has no parameter channel", known.ppo());
-                    return Err(own.unread(&why));
+                    return Err(interlock.unread(&why));
                 }
                 None => {
-                    let started = talk.start(own.slave, known.ppo(), None);
+                    let started = talk.start(address, known.ppo(), None);
                     let image = started
-                        .and_then(|()| talk.exchange(own.slave, known.ppo(), &Image::default()));
-                    let image = image.map_err(|error| own.unread(&error.to_string()))?;
-                    match own.broken_in(&image) {
+                        .and_then(|()| talk.exchange(address, known.ppo(), &Image::default()));
+                    let image = image.map_err(|error| interlock.unread(&error.to_string()))?;
+                    match interlock.broken_in(&image) {
                         Some(why) => return Err(Trouble::Interlock(why)),
                         None => continue,
                     }
                 }
             };
-            if let Some(why) = own.broken(number) {
+            if let Some(why) = interlock.broken(number) {
                 return Err(Trouble::Interlock(why));
             }
         }
@@ -273,9 +280,9 @@ impl Watch for InverterInterlocks {
             let Some((address, image)) = reply(&self.heard, slave) else {
                 continue;
             };
-            let broken = |own: &InverterInterlock| own.broken_in(&image);
-            let mut own = self.all.iter().filter(|own| own.slave == address);
-            if let Some(why) = own.find_map(broken) {
+            let all = self.all.iter();
+            let mut all = all.filter(|interlock| interlock.slave == address);
+            if let Some(why) = all.find_map(|interlock| interlock.broken_in(&image)) {
                 return Err(why);
             }
         }

@@ -68,12 +68,11 @@ impl Known {
 
     /// Whether every value of a property but that of [`Self::properties`] is excluded.
     pub(super) fn is_settled(&self, property: &Description) -> bool {
-        let own = value_of(property, &self.properties);
+        let held = value_of(property, &self.properties);
         let mut open = self.open.iter();
-        open.all(|(_, other)| value_of(property, other) == own)
+        open.all(|(_, other)| value_of(property, other) == held)
     }
 
-    /// Settles a property.
     pub(super) fn settle(&mut self, property: &Description, word: &str) {
         let mut all = std::mem::take(&mut self.open);
         all.retain_mut(|(_, other)| property.set(other, word));
@@ -93,12 +92,12 @@ impl Known {
         }
         let values = Arc::make_mut(&mut self.values);
         let shown = Arc::make_mut(&mut self.shown);
-        let all = PARAMETERS.iter().filter(|own| !own.has(Flag::ReadOnly));
-        for parameter in all.filter(|own| !own.needs_posicon()) {
+        let all = PARAMETERS.iter().filter(|row| !row.has(Flag::ReadOnly));
+        for parameter in all.filter(|row| !row.needs_posicon()) {
             for ind in indices(parameter) {
                 let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
                 let answer = confirmed(self.slave, talk, task)?;
-                if let Some((answer, value)) = answer.and_then(|own| Some((own, value(own)?))) {
+                if let Some((answer, value)) = answer.and_then(|word| Some((word, value(word)?))) {
                     values.insert((parameter.number, ind), value);
                     shown.insert((parameter.number, ind), answer.pwe);
                 }
@@ -119,20 +118,20 @@ impl Known {
         talk.start(self.slave.address, self.ppo(), None)?;
         let mut read = |number: u16| {
             let parameter = Parameter::of(number);
-            let ak = parameter.map_or(0, |own| Task::read(own).ak());
+            let ak = parameter.map_or(0, |parameter| Task::read(parameter).ak());
             let word = self.task(talk, Pkw::of(ak, number, 0, 0))?;
-            Ok::<_, TalkError>(word.and_then(|own| u16::try_from(own).ok()))
+            Ok::<_, TalkError>(word.and_then(|word| u16::try_from(word).ok()))
         };
         // The bench's own words replace the one that a slave holds which takes them.
         let word = match self.is_bus_controlled() {
             true => None,
             false => read(CONTROL_WORD)?,
         };
-        let fault = read(LAST_FAULT)?.and_then(|own| u8::try_from(own).ok());
+        let fault = read(LAST_FAULT)?.and_then(|number| u8::try_from(number).ok());
         Ok(History {
             // Before the first valid word it shows one that is not valid.
-            stw: word.filter(|own| own & stw::VALID != 0),
-            faults: fault.filter(|own| *own != 0).into_iter().collect(),
+            stw: word.filter(|word| word & stw::VALID != 0),
+            faults: fault.filter(|fault| *fault != 0).into_iter().collect(),
         })
     }
 
@@ -210,7 +209,7 @@ fn confirmed(slave: RigSlave, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<P
 pub(super) fn value(answer: Pkw) -> Option<u32> {
     match answer.answer()? {
         Answer::Error(_) | Answer::None => None,
-        own => Some(own.pwe()),
+        answer => Some(answer.pwe()),
     }
 }
 
@@ -236,19 +235,19 @@ fn indices(parameter: &Parameter) -> impl Iterator<Item = u16> {
         true => u16::from(parameter.sets()),
         false => 1,
     };
-    (0..count).map(|own| own << 8)
+    (0..count).map(|set| set << 8)
 }
 
 /// The properties that differ from these in one point that the manual leaves open and that `may` differ, each with the words of the difference.
 pub(super) fn candidates(
-    own: Properties,
+    base: Properties,
     may: impl Fn(&Description) -> bool,
 ) -> Vec<(String, Properties)> {
     let mut all = Vec::new();
     for property in PROPERTIES.iter().filter(|property| may(property)) {
         for word in super::values(property) {
-            let mut other = own;
-            if property.set(&mut other, &word) && other != own {
+            let mut other = base;
+            if property.set(&mut other, &word) && other != base {
                 all.push((format!("{} = {word}", property.name), other));
             }
         }
@@ -259,10 +258,10 @@ pub(super) fn candidates(
 /// The value of a property, in words.
 pub(super) fn value_of(property: &Description, properties: &Properties) -> String {
     let holds = |word: &String| {
-        let mut own = *properties;
-        property.set(&mut own, word) && own == *properties
+        let mut changed = *properties;
+        property.set(&mut changed, word) && changed == *properties
     };
-    let number = (0..=u8::MAX).map(|own| own.to_string());
+    let number = (0..=u8::MAX).map(|number| number.to_string());
     let mut all = super::values(property).into_iter().chain(number);
     all.find(holds).unwrap_or_default()
 }

@@ -35,7 +35,6 @@ pub(super) struct Turn {
     pub(super) read: Option<Instant>,
 }
 
-/// What was noted.
 #[derive(Default)]
 pub(super) struct TelegramNotes {
     /// The telegrams since the last [`begin_fresh`](Self::begin_fresh), in one time.
@@ -114,7 +113,8 @@ pub(super) const WHOLE: Agreement = Agreement::MAX;
 impl Came {
     /// The same octets, whenever they came.
     pub(super) fn at_any_time(mut self) -> Self {
-        self.0.iter_mut().for_each(|own| *own = own.at_any_time());
+        let octets = self.0.iter_mut();
+        octets.for_each(|octet| *octet = octet.at_any_time());
         self
     }
 
@@ -124,17 +124,17 @@ impl Came {
             return WHOLE;
         }
         let pairs = || self.0.iter().zip(&other.0);
-        let same = pairs().take_while(|(own, other)| own == other).count();
+        let same = pairs().take_while(|(ours, other)| ours == other).count();
         let next = pairs().nth(same);
-        let bits = next.map_or(0, |(own, other)| {
-            (own.bits ^ other.bits).count_zeros() as usize
+        let bits = next.map_or(0, |(ours, other)| {
+            (ours.bits ^ other.bits).count_zeros() as usize
         });
         same * 32 + bits
     }
 
     /// The telegrams among the octets.
     pub(super) fn telegrams(&self) -> Vec<Telegram> {
-        let octets: Vec<u8> = self.0.iter().map(|own| own.bits as u8).collect();
+        let octets: Vec<u8> = self.0.iter().map(|octet| octet.bits as u8).collect();
         let mut rest = octets.as_slice();
         let mut all = Vec::new();
         while !rest.is_empty() {
@@ -180,19 +180,18 @@ impl TelegramNotes {
             return;
         };
         let place = (self.kept.len() - 1).checked_sub(expected.behind);
-        let Some((place, own)) = place.zip(self.kept.last()) else {
+        let Some((place, last)) = place.zip(self.kept.last()) else {
             return;
         };
-        let own = match expected.timed {
-            true => *own,
-            false => own.at_any_time(),
+        let last = match expected.timed {
+            true => *last,
+            false => last.at_any_time(),
         };
-        if expected.came.0.get(place) != Some(&own) {
+        if expected.came.0.get(place) != Some(&last) {
             self.differs = Some(Trouble::Interrupted);
         }
     }
 
-    /// How many octets are kept.
     pub(super) const fn len(&self) -> usize {
         self.kept.len()
     }
@@ -223,15 +222,15 @@ pub(super) fn changes(octets: &[u8]) -> Vec<(u8, Pkw)> {
     let exchange = telegram
         .as_ref()
         .and_then(Telegram::pdu)
-        .filter(|own| Service::of(own.dsap()) == Some(Service::DataExchange));
+        .filter(|pdu| Service::of(pdu.dsap()) == Some(Service::DataExchange));
     let Some(pdu) = exchange else {
         return Vec::new();
     };
-    let layouts = PpoType::ALL.into_iter().filter(|own| own.has_pkw());
+    let layouts = PpoType::ALL.into_iter().filter(|ppo| ppo.has_pkw());
     let tasks = layouts.filter_map(|ppo| Some(Image::decode(ppo, pdu.data())?.pkw));
     let changes =
-        tasks.filter(|own| own.task().is_change() && own.task() != Task::ChangeDescription);
-    changes.map(|own| (pdu.da(), own)).collect()
+        tasks.filter(|task| task.task().is_change() && task.task() != Task::ChangeDescription);
+    changes.map(|task| (pdu.da(), task)).collect()
 }
 
 /// The address that a task may give to its station.
@@ -241,7 +240,7 @@ pub(super) fn moves_to(task: Pkw) -> Option<u8> {
         number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
         _ => None,
     };
-    to.filter(|own| (1..=DEFAULT_ADDRESS).contains(own))
+    to.filter(|address| (1..=DEFAULT_ADDRESS).contains(address))
 }
 
 impl LinkNotes for TelegramNotes {
@@ -262,7 +261,7 @@ impl LinkNotes for TelegramNotes {
         self.reach(end);
         for (station, task) in changes(what.octets()) {
             self.written.insert((station, task.number(), task.ind));
-            self.moved.extend(moves_to(task).map(|own| (station, own)));
+            self.moved.extend(moves_to(task).map(|to| (station, to)));
         }
     }
 
@@ -295,8 +294,8 @@ impl LinkNotes for TelegramNotes {
         let Some(asked) = self.asked else { return };
         let _too_long = self.reply.push(octet.byte);
         if let Decoded::Value { used, .. } = Telegram::decode(&self.reply) {
-            let own = medium.octet_time() * used as u64;
-            let took = now.since(asked).saturating_sub(own);
+            let length = medium.octet_time() * used as u64;
+            let took = now.since(asked).saturating_sub(length);
             self.longest = self.longest.max(took);
             self.asked = None;
         }

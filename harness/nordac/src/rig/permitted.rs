@@ -7,8 +7,8 @@ use harness_proto::nordac::words::FULL;
 /// What a rig's file and the command line allow together.
 #[must_use]
 pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
-    let own = &rig.file.limits;
-    let more = &own.port;
+    let granted = &rig.file.limits;
+    let more = &granted.port;
     // Rounded down.
     let setpoint = more.max_setpoint.map(|most| {
         let raw = (most.0 * f64::from(FULL) / 100.0).floor();
@@ -19,8 +19,8 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         Highest::Frequency(tenths.clamp(0.0, 9_990.0) as u16)
     });
     Limits {
-        motion: own.allow_motion && (allow_motion || rig.is_simulated()),
-        eeprom: own.allow_eeprom,
+        motion: granted.allow_motion && (allow_motion || rig.is_simulated()),
+        eeprom: granted.allow_eeprom,
         motor_data: more.allow_motor_data,
         bus_settings: more.allow_bus_settings,
         other_stations: more.allow_other_stations,

@@ -29,7 +29,7 @@ impl Profiled {
         };
         // The file was checked.
         let read: Result<Scenario<Nordac>, Problems> = read(&source, Part::Header);
-        let lines = read.map_or_else(|_| Vec::new(), |own| own.header.slaves);
+        let lines = read.map_or_else(|_| Vec::new(), |scenario| scenario.header.slaves);
         let properties = lines.into_iter().filter_map(|line| match line.what {
             SetupKind::Property(property, word) => {
                 Some((address(&line.slave, Scope::default()).ok()?, property, word))
@@ -45,12 +45,12 @@ impl Profiled {
     /// No value that the slave can have is that of the profile: it is of another slave.
     pub(super) fn settle(&self, known: &mut Known) -> Result<(), TalkError> {
         let slave = known.slave.address;
-        for (_, property, word) in self.0.iter().filter(|own| own.0 == slave) {
-            let has = |own: Properties| {
-                let mut other = own;
-                property.set(&mut other, word) && other == own
+        for (_, property, word) in self.0.iter().filter(|row| row.0 == slave) {
+            let has = |properties: Properties| {
+                let mut other = properties;
+                property.set(&mut other, word) && other == properties
             };
-            let candidates = known.open.iter().map(|(_, own)| *own);
+            let candidates = known.open.iter().map(|(_, properties)| *properties);
             let mut possible = std::iter::once(known.properties).chain(candidates);
             if !possible.any(has) {
                 return Err(TalkError::OtherThanProfile {
@@ -62,8 +62,8 @@ impl Profiled {
             let _fits = property.set(&mut known.properties, word);
             let named = format!("{} = ", property.name);
             known.open.retain(|(words, _)| !words.starts_with(&named));
-            for (_, own) in &mut known.open {
-                let _fits = property.set(own, word);
+            for (_, properties) in &mut known.open {
+                let _fits = property.set(properties, word);
             }
         }
         Ok(())
@@ -86,16 +86,17 @@ mod tests {
         let fresh = Known::new(slave);
         for property in PROPERTIES {
             let named = format!("{} = ", property.name);
-            let word = fresh.open.iter().find_map(|own| own.0.strip_prefix(&named));
+            let mut open = fresh.open.iter();
+            let word = open.find_map(|(words, _)| words.strip_prefix(&named));
             let word = word.expect("another value").to_owned();
             let profile = Profiled(vec![(8, property, word.clone())]);
             let mut known = fresh.clone();
             profile.settle(&mut known).expect("possible");
             assert_ne!(known.properties, fresh.properties, "{named}{word}");
-            assert!(known.open.iter().all(|own| !own.0.starts_with(&named)));
-            let kept = known.open.iter().all(|(_, own)| {
-                let mut other = *own;
-                property.set(&mut other, &word) && other == *own
+            assert!(known.open.iter().all(|point| !point.0.starts_with(&named)));
+            let kept = known.open.iter().all(|(_, properties)| {
+                let mut other = *properties;
+                property.set(&mut other, &word) && other == *properties
             });
             assert!(kept, "{named}{word}");
             let mut shown = fresh.clone();

@@ -57,17 +57,18 @@ impl Player {
     pub(super) fn put_back<L: Line>(&self, line: &mut Guarded<L>, origin: &str) -> Vec<String> {
         let mut notes = Vec::new();
         for known in self.known() {
-            let own = known.slave;
+            let listed = known.slave;
             let places: Vec<_> = match line.slaves() {
-                Some(gate) => gate.places(own.address).collect(),
-                None => vec![own.address],
+                Some(gate) => gate.places(listed.address).collect(),
+                None => vec![listed.address],
             };
             let changed = changed(known, &places, &self.written);
             let mut talk = Talk::new(Box::new(&mut *line), self.patience());
             let slave = match found(&mut talk, &places) {
-                Ok((address, _)) => RigSlave { address, ..own },
+                Ok((address, _)) => RigSlave { address, ..listed },
                 Err(why) => {
-                    notes.push(format!("{why}{}", commands(known, own, &changed, origin)));
+                    let back = commands(known, listed, &changed, origin);
+                    notes.push(format!("{why}{back}"));
                     continue;
                 }
             };
@@ -84,7 +85,7 @@ impl Player {
             }
             if let Some((kept, why)) = left {
                 let commands = commands(known, slave, &kept, origin);
-                notes.push(format!("slave {}: {why}{commands}", own.address));
+                notes.push(format!("slave {}: {why}{commands}", listed.address));
             }
             if let Err(error) = fault {
                 notes.push(error.to_string());
@@ -114,7 +115,7 @@ impl Player {
             .map(|known| (known, known.slave.address));
         let moved = moved.filter_map(|(slave, to)| {
             let mut known = self.known().iter();
-            Some((known.find(|own| own.slave.address == *slave)?, *to))
+            Some((known.find(|known| known.slave.address == *slave)?, *to))
         });
         let elsewhere = same.chain(moved).filter_map(|(known, address)| {
             let ppo = known.slave.ppo.filter(|_| !may_switch(known, begun));
@@ -131,23 +132,24 @@ impl Player {
 /// Whether a scenario may give a slave another PPO type.
 fn may_switch(known: &Known, begun: &Begun) -> bool {
     let address = known.slave.address;
-    let moved = begun.moved.iter().filter(|own| own.0 == address);
-    let places: Vec<_> = moved.map(|own| own.1).chain([address]).collect();
+    let moved = begun.moved.iter().filter(|change| change.0 == address);
+    let places: Vec<_> = moved.map(|change| change.1).chain([address]).collect();
     let all = changed(known, &places, &begun.written);
-    all.iter().any(|own| own.0 == PPO_TYPE)
+    all.iter().any(|change| change.0 == PPO_TYPE)
 }
 
 /// What may have been `written` to a slave that was at these addresses, in the order in which it is put back.
 fn changed(known: &Known, places: &[u8], written: &BTreeSet<Written>) -> Vec<Place> {
     let written: Vec<_> = written
         .iter()
-        .filter(|own| places.contains(&own.0))
+        .filter(|write| places.contains(&write.0))
         .collect();
     let wiped = written.iter().any(|(_, number, _)| WIPES.contains(number));
     let all = known.values.keys().copied();
     let mut all: Vec<_> = all
         .filter(|(number, ind)| {
-            let tells = written.iter().any(|own| (own.1, own.2) == (*number, *ind));
+            let mut told = written.iter().map(|write| (write.1, write.2));
+            let tells = told.any(|place| place == (*number, *ind));
             !WIPES.contains(number) && (wiped || tells)
         })
         .collect();
@@ -169,7 +171,7 @@ fn commands(known: &Known, at: RigSlave, places: &[Place], origin: &str) -> Stri
     if values.is_empty() {
         return String::new();
     }
-    let moves = places.iter().any(|own| class(own.0) == Class::Speed);
+    let moves = places.iter().any(|place| class(place.0) == Class::Speed);
     let moves = if moves { " --move" } else { "" };
     let (slave, at) = (known.slave.address, at.address);
     let first = match slave == at {
@@ -223,7 +225,7 @@ impl<'k, 'l> Back<'k, 'l> {
         if let Err(error) = self.begin() {
             return Some((places.to_vec(), error.to_string()));
         }
-        let has_pkw = self.slave.ppo.is_some_and(|own| own.has_pkw());
+        let has_pkw = self.slave.ppo.is_some_and(|ppo| ppo.has_pkw());
         if !has_pkw {
             let why = "it is set to a PPO type that has no parameter channel: set 1622 at its keys";
             return Some((places.to_vec(), why.to_owned()));

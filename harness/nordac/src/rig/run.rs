@@ -66,32 +66,32 @@ impl PortPlayer for Player {
         Own::read(source)
     }
 
-    fn not_begun(&self, own: &Own) -> Option<Skip> {
-        Self::not_begun(self, own)
+    fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+        Self::not_begun(self, scenario)
     }
 
-    fn disturbs(own: &Own) -> bool {
+    fn disturbs(scenario: &Own) -> bool {
         let faults = [
             Capability::Power,
             Capability::Interposer,
             Capability::LineErrors,
         ];
-        own.plan.needs.iter().any(|need| faults.contains(need))
+        scenario.plan.needs.iter().any(|need| faults.contains(need))
     }
 
     fn deviates(rig: &Rig) -> bool {
         let setup = rig.port().map(|port| setup(port, &setup_text(rig)));
-        let slaves = setup.and_then(Result::ok).map(|own| own.slaves);
+        let slaves = setup.and_then(Result::ok).map(|setup| setup.slaves);
         let mut slaves = slaves.into_iter().flatten();
-        slaves.any(|own| own.deviation.is_some())
+        slaves.any(|slave| slave.deviation.is_some())
     }
 
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
         Self::replay(self, events, tolerance)
     }
 
-    fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
-        Self::attempt(self, own, link)
+    fn attempt(&mut self, scenario: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+        Self::attempt(self, scenario, link)
     }
 
     fn set_back(&mut self, _: &Own, session: &mut Session) -> Vec<String> {

@@ -23,7 +23,6 @@ use harness_proto::nordac::guard::GuardedSlave;
 use harness_proto::profibus::dp::Diagnosis;
 use harness_proto::time::Span;
 
-/// The inverters of a rig.
 #[derive(Clone, Debug)]
 pub(crate) struct Inverters {
     slaves: Vec<RigSlave>,
@@ -37,7 +36,6 @@ pub(crate) type Session = PortSession<Inverters>;
 
 impl PortDrives for Inverters {
     const WORDS: [&'static str; 2] = ["slave", "PROFIBUS segment"];
-    /// Its address.
     type Drive = u8;
 
     fn open(
@@ -47,7 +45,7 @@ impl PortDrives for Inverters {
     ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
         let slaves = slaves(port);
         let (ends, locks) = ends(rig, port, options)?;
-        let known: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
+        let known: Vec<GuardedSlave> = slaves.iter().copied().map(Into::into).collect();
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &known, port.listen_only);
         let patience = patience_of(rig, port);
@@ -72,7 +70,7 @@ impl PortDrives for Inverters {
     }
 
     fn listed(&self) -> Vec<u8> {
-        self.slaves.iter().map(|own| own.address).collect()
+        self.slaves.iter().map(|slave| slave.address).collect()
     }
 
     fn number(address: &u8) -> u8 {
@@ -81,7 +79,7 @@ impl PortDrives for Inverters {
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
         InverterInterlocks::of(rig, &self.slaves, self.patience)
-            .map(|own| Box::new(own) as Box<dyn Watch>)
+            .map(|interlocks| Box::new(interlocks) as Box<dyn Watch>)
     }
 
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {
@@ -137,7 +135,8 @@ fn listen(session: &mut Session) -> Result<(), SessionError> {
 
 /// Asks every slave for its diagnosis and its configuration.
 fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
-    let unknown = session.drives().slaves.iter().any(|own| own.ppo.is_none());
+    let mut slaves = session.drives().slaves.iter();
+    let unknown = slaves.any(|slave| slave.ppo.is_none());
     if session.listens_only() || !session.rig().file.health.before && !unknown {
         return Ok(());
     }
@@ -157,7 +156,7 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
         match asked {
             Ok((diagnosis, ppo)) => {
                 found.push(RigSlave { ppo, ..slave });
-                let wrong = differs(&slave, &diagnosis, ppo.map(|own| own.number()));
+                let wrong = differs(&slave, &diagnosis, ppo.map(|ppo| ppo.number()));
                 if silent.is_ok() {
                     silent = wrong;
                 }
@@ -176,7 +175,7 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
     match silent {
         Err(mut why) if !ill_as_well => {
             let ports = session.link().inner_mut().ports_mut();
-            if ports.is_some_and(|own| own.has_unproven_rate(0)) {
+            if ports.is_some_and(|ports| ports.has_unproven_rate(0)) {
                 why = format!("{why}; {UNPROVEN_RATE}");
             }
             Err(session.failed(&why))
@@ -233,7 +232,7 @@ fn ends(
     let wire = wire.map_err(|error| unopened(rig, &error))?;
     let lock = locks.then(|| lock(rig, &place, wire.fd()));
     let locks = lock.transpose()?.into_iter().collect();
-    let addresses = slaves(port).iter().map(|own| own.address).collect();
+    let addresses = slaves(port).iter().map(|slave| slave.address).collect();
     let how = (patience(port), port.echo);
     let link = SegmentLink::new(wire, rate, addresses, how, options.interrupt.clone());
     Ok((Ends::Ports(Box::new(link)), locks))

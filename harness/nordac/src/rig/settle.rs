@@ -110,7 +110,7 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkErr
         let remembers = !known.history.faults.is_empty();
         for task in TASKS
             .iter()
-            .filter(|own| !remembers || !FAULT_MEMORY.contains(&own.number()))
+            .filter(|task| !remembers || !FAULT_MEMORY.contains(&task.number()))
         {
             for pkw in [*task, Pkw::default()] {
                 let outputs = Image {
@@ -153,11 +153,11 @@ pub(super) fn search(
         let mut found = best(so_far.0, &one);
         if found.is_empty() {
             // Two points that each show nothing up to the first difference do not explain it.
-            let seen = one.iter().filter(|own| own.agreed != so_far.0);
-            let seen: BTreeSet<_> = seen.map(|own| name_of(&own.words)).collect();
+            let seen = one.iter().filter(|step| step.agreed != so_far.0);
+            let seen: BTreeSet<_> = seen.map(|step| name_of(&step.words)).collect();
             let two = one
                 .iter()
-                .filter(|own| seen.contains(name_of(&own.words)))
+                .filter(|step| seen.contains(name_of(&step.words)))
                 .flat_map(|first| {
                     // Each pair in one order, and no property twice.
                     let later = |place: usize, property: &Description| {
@@ -165,7 +165,7 @@ pub(super) fn search(
                         let done = seen.contains(property.name) && property.name <= name;
                         property.name != name && !done && may(place, property)
                     };
-                    let both = |(second, own)| (format!("{}, {second}", first.words), own);
+                    let both = |(second, slaves)| (format!("{}, {second}", first.words), slaves);
                     steps(&first.slaves, later).into_iter().map(both)
                 })
                 .collect();
@@ -173,11 +173,11 @@ pub(super) fn search(
         }
         match found.first() {
             None => return Vec::new(),
-            Some(own) if own.agreed == WHOLE => {
+            Some(step) if step.agreed == WHOLE => {
                 let all = found.into_iter();
-                return all.map(|own| (own.words, own.slaves)).collect();
+                return all.map(|step| (step.words, step.slaves)).collect();
             }
-            Some(own) => so_far = (own.agreed, own.slaves.clone()),
+            Some(step) => so_far = (step.agreed, step.slaves.clone()),
         }
     }
     Vec::new()
@@ -205,9 +205,9 @@ fn judged(
 
 /// Those that explain most, all as much; none if that is no more than `so_far`.
 fn best(so_far: Agreement, all: &[Step]) -> Vec<Step> {
-    let most = all.iter().map(|own| own.agreed).max();
+    let most = all.iter().map(|step| step.agreed).max();
     let most = most.filter(|most| *most > so_far);
-    let best = all.iter().filter(|own| Some(own.agreed) == most);
+    let best = all.iter().filter(|step| Some(step.agreed) == most);
     best.cloned().collect()
 }
 
@@ -220,9 +220,9 @@ fn name_of(words: &str) -> &str {
 fn steps(from: &Assumed, may: impl Fn(usize, &Description) -> bool) -> Vec<(String, Assumed)> {
     let of = |place: usize| {
         let near = candidates(from[place], |property| may(place, property));
-        near.into_iter().map(move |(words, own)| {
+        near.into_iter().map(move |(words, properties)| {
             let mut other = from.clone();
-            other[place] = own;
+            other[place] = properties;
             (words, other)
         })
     };
@@ -238,9 +238,9 @@ pub(super) fn settle(
     let found = search(&default, |_, _| true, |all| explains(all[0]));
     let base = found.first()?.1[0];
     let others = found.into_iter().skip(1);
-    let others = others.map(|(words, own)| (words, own[0]));
+    let others = others.map(|(words, slaves)| (words, slaves[0]));
     let near = candidates(base, |_| true).into_iter();
-    let mut open: Vec<_> = near.filter(|own| explains(own.1) == WHOLE).collect();
+    let mut open: Vec<_> = near.filter(|point| explains(point.1) == WHOLE).collect();
     open.extend(others);
     Some((base, open))
 }
@@ -255,8 +255,8 @@ mod tests {
     #[test]
     fn two_points_are_changed_at_once() {
         let holds = |all: &Assumed, name: &str, value: &str| {
-            let mut named = PROPERTIES.iter().filter(|own| own.name == name);
-            named.any(|own| value_of(own, &all[0]) == value)
+            let mut named = PROPERTIES.iter().filter(|property| property.name == name);
+            named.any(|property| value_of(property, &all[0]) == value)
         };
         let explains = |all: &Assumed| match (
             holds(all, "subindex-bits", "7..15"),
@@ -270,7 +270,7 @@ mod tests {
         let found = search(&base, |_, _| true, explains);
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(explains(&found[0].1), WHOLE);
-        let fixed = |_: usize, own: &Description| own.name != "subindex-bits";
+        let fixed = |_: usize, property: &Description| property.name != "subindex-bits";
         assert!(search(&base, fixed, explains).is_empty());
     }
 }

@@ -29,23 +29,16 @@ pub(crate) enum TalkError {
         "slave {slave} does not have {property} = {says}, as the profile of the rig's file says: the profile is of another slave; qualify this one, or take `profile` out of the file"
     )]
     OtherThanProfile {
-        /// Its address.
         slave: u8,
         property: &'static str,
-        /// What the profile says.
         says: String,
     },
     /// It does not reply.
     #[error("slave {slave} does not reply to {service}")]
-    NoReply {
-        /// Its address.
-        slave: u8,
-        service: &'static str,
-    },
+    NoReply { slave: u8, service: &'static str },
     /// Its reply is none to this service.
     #[error("slave {slave} replies to {service} with {found}")]
     Unexpected {
-        /// Its address.
         slave: u8,
         service: &'static str,
         /// What it replies, in words.
@@ -54,24 +47,18 @@ pub(crate) enum TalkError {
     /// It does not get into the exchange.
     #[error("slave {slave}: {why}")]
     Start {
-        /// Its address.
         slave: u8,
         /// Why not.
         why: StartError,
     },
     /// An exchange failed.
     #[error("slave {slave}: {why}")]
-    Exchange {
-        /// Its address.
-        slave: u8,
-        why: ExchangeError,
-    },
+    Exchange { slave: u8, why: ExchangeError },
     /// It has a fault.
     #[error(
         "slave {slave} has a fault (ZSW {zsw:04X}): remove its cause and `drivebench acknowledge {slave}`; with `allow_motion` in [limits] and --allow-motion the bench acknowledges it before each scenario"
     )]
     Fault {
-        /// Its address.
         slave: u8,
         /// What it shows.
         zsw: u16,
@@ -200,7 +187,7 @@ impl<'l> Talk<'l> {
             Requests::new(MASTER, slave).or_else(|_| Requests::new(MASTER, 0))
         };
         match self.requests.entry(slave) {
-            std::collections::btree_map::Entry::Occupied(own) => own.into_mut(),
+            std::collections::btree_map::Entry::Occupied(requests) => requests.into_mut(),
             std::collections::btree_map::Entry::Vacant(place) => {
                 let Ok(fresh) = fresh() else {
                     unreachable!("both addresses are in range")
@@ -400,8 +387,8 @@ mod tests {
         assert!(!fits(&diagnosis, &SlaveReply::Confirmed));
         assert!(fits(&parameters, &SlaveReply::Confirmed));
         assert!(!fits(&parameters, &SlaveReply::Present));
-        for own in [diagnosis, parameters] {
-            assert!(fits(&own, &SlaveReply::NotActivated));
+        for reply in [diagnosis, parameters] {
+            assert!(fits(&reply, &SlaveReply::NotActivated));
         }
     }
 }

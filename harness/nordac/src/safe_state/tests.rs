@@ -9,7 +9,7 @@ use harness_bench::link::{DriveFault, Link, Moment, Octets, PlacedFault, Trouble
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::PROPERTIES;
+use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{FrameControl, Function, Sequence};
 use harness_proto::profibus::{BusRate, Pdu};
 use harness_sim::nordac::deviation::deviations;
@@ -30,9 +30,9 @@ fn slave(address: u8, ppo: PpoType) -> SlaveSetup {
 }
 
 fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<RigSlave>) {
-    let known = slaves.iter().map(|own| RigSlave {
-        address: own.address,
-        ppo: Some(own.ppo),
+    let known = slaves.iter().map(|slave| RigSlave {
+        address: slave.address,
+        ppo: Some(slave.ppo),
     });
     let known: Vec<_> = known.collect();
     let setup = Setup {
@@ -40,7 +40,7 @@ fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<RigSlav
         slaves,
         master: None,
     };
-    let gated: Vec<_> = known.iter().map(|own| GuardedSlave::from(*own)).collect();
+    let gated: Vec<GuardedSlave> = known.iter().copied().map(Into::into).collect();
     (guarded(Bench::new(&setup), limits, &gated, false), known)
 }
 
@@ -83,9 +83,9 @@ fn motors_that_run_are_stopped_whatever_the_manual_leaves_open() {
         .to_vec();
     for property in PROPERTIES {
         for word in values(property) {
-            let mut own = slave(8, PpoType::One);
-            assert!(property.set(&mut own.properties, &word), "{word}");
-            all.push(vec![own]);
+            let mut setup = slave(8, PpoType::One);
+            assert!(property.set(&mut setup.properties, &word), "{word}");
+            all.push(vec![setup]);
         }
     }
     for setup in all {
@@ -250,9 +250,9 @@ fn last_words_switch_every_output_off() {
         }
         talk.pass(Span::from_millis(waits)).expect("sound");
         drop(talk);
-        assert!(slaves.iter().all(|own| is_on(&line, own.address)));
+        assert!(slaves.iter().all(|slave| is_on(&line, slave.address)));
         if !known {
-            slaves.iter_mut().for_each(|own| own.ppo = None);
+            slaves.iter_mut().for_each(|slave| slave.ppo = None);
         }
         for telegram in last_words(&slaves) {
             line.send_octets(0, &telegram);
@@ -269,17 +269,18 @@ fn last_words_switch_every_output_off() {
 /// and an inverter whose output stays on is never confirmed by it (NORDAC 2.6, 3.2.2).
 #[test]
 fn a_computer_that_stands_still_accuses_no_inverter() {
-    let latency = PROPERTIES.iter().find(|own| own.name == "pzd-latency");
+    let latency = Description::of("pzd-latency");
     let latency = latency.expect("an open point");
     let orders = [
         vec![StandstillStep::Stop, StandstillStep::Block],
         vec![StandstillStep::Block],
     ];
     let mut all = Vec::new();
-    for (order, obeys) in orders.iter().flat_map(|own| [(own, true), (own, false)]) {
+    let both = |order| [(order, true), (order, false)];
+    for (order, obeys) in orders.iter().flat_map(both) {
         for waits in [0, 5_000] {
             let ms = [700, 1_500, 12_000].into_iter();
-            all.extend(ms.flat_map(|ms| (1..16).map(move |own| (order, obeys, waits, ms, own))));
+            all.extend(ms.flat_map(|ms| (1..16).map(move |at| (order, obeys, waits, ms, at))));
         }
     }
     for (order, obeys, waits, ms, telegrams) in all {
@@ -288,12 +289,12 @@ fn a_computer_that_stands_still_accuses_no_inverter() {
             within: Span::from_millis(500),
             ..Standstill::default()
         };
-        let mut own = slave(8, PpoType::One);
-        assert!(latency.set(&mut own.properties, "2"));
+        let mut setup = slave(8, PpoType::One);
+        assert!(latency.set(&mut setup.properties, "2"));
         if !obeys {
-            own.deviation = deviations().find(|own| own.name == "always-enabled-shown");
+            setup.deviation = deviations().find(|wrong| wrong.name == "always-enabled-shown");
         }
-        let (mut line, slaves) = line(vec![own], Limits::unlimited());
+        let (mut line, slaves) = line(vec![setup], Limits::unlimited());
         run(&mut line, &slaves);
         if waits > 0 {
             let mut talk = Talk::new(Box::new(&mut line), PATIENCE);

@@ -42,9 +42,9 @@ fn all_calls(driver: &mut Driver<'_>) -> Vec<Result<(), Error>> {
 fn every_value_of_every_property() {
     for property in PROPERTIES {
         for value in values(property) {
-            let mut own = slave(8, PpoType::One, &RAMPS);
-            assert!(property.set(&mut own.properties, &value), "{value}");
-            let mut bench = bench(RATE, &[own]);
+            let mut setup = slave(8, PpoType::One, &RAMPS);
+            assert!(property.set(&mut setup.properties, &value), "{value}");
+            let mut bench = bench(RATE, &[setup]);
             let mut driver = driver(&mut bench, RATE);
             let name = property.name;
             // The slave does not answer the first telegram; the driver asks again.
@@ -60,11 +60,11 @@ fn every_value_of_every_property() {
 fn every_deviation_ends() {
     let mut troubled = 0;
     for deviation in deviations() {
-        let own = SlaveSetup {
+        let setup = SlaveSetup {
             deviation: Some(deviation),
             ..slave(8, PpoType::One, &RAMPS)
         };
-        let mut bench = bench(RATE, &[own]);
+        let mut bench = bench(RATE, &[setup]);
         let mut driver = driver(&mut bench, RATE);
         let results = all_calls(&mut driver);
         let end = Instant::START + LONGEST;

@@ -8,7 +8,6 @@ use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::times;
 
-/// The names of the jobs.
 pub(in super::super) const NAMES: [&str; 8] = [
     "start",
     "exchange",
@@ -39,8 +38,8 @@ const RECEIVED: [(&str, WordName); 5] = [
 /// How a word is called in a request, or in a reply.
 pub(in super::super) fn word_name(word: WordName, sent: bool) -> &'static str {
     let names = if sent { &SENT } else { &RECEIVED };
-    let own = names.iter().find(|(_, own)| *own == word);
-    own.map_or("", |(name, _)| name)
+    let row = names.iter().find(|(_, name)| *name == word);
+    row.map_or("", |(name, _)| name)
 }
 
 /// Reads the rest of a job; `None` if there is none of this name.
@@ -142,7 +141,7 @@ fn contents(scanner: &mut Scanner<'_>, name: WordName) -> Result<WordKind, Probl
     let before = scanner.clone();
     let negative = scanner.eat("-");
     let text = scanner.take_while(|c| c.is_ascii_alphanumeric() || ".%".contains(c));
-    let text = text.map_or("", |own| own.value);
+    let text = text.map_or("", |text| text.value);
     let length = if name == WordName::Pkw { 8 } else { 2 };
     let percent = text.strip_suffix('%').filter(|_| name != WordName::Pkw);
     let found = match percent {
@@ -150,7 +149,7 @@ fn contents(scanner: &mut Scanner<'_>, name: WordName) -> Result<WordKind, Probl
             WordKind::Percent(if negative { -digits } else { digits }, places)
         }),
         None => bytes(text.strip_suffix('h').unwrap_or(text))
-            .filter(|own| own.len() == length && !negative)
+            .filter(|bytes| bytes.len() == length && !negative)
             .map(WordKind::Bytes),
     };
     found.ok_or_else(|| {

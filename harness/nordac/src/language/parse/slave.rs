@@ -61,7 +61,7 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Pr
         }
         Word::Deviates => {
             let names: Vec<(&str, &'static Deviation)> =
-                deviations().map(|own| (own.name, own)).collect();
+                deviations().map(|wrong| (wrong.name, wrong)).collect();
             let line = "`slave 8 deviates NAME`";
             SlaveLine::Setup(SetupKind::Deviates(deviation(
                 scanner, &names, "a slave", line,
@@ -123,7 +123,7 @@ fn there(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
 pub(super) fn ppo_type(scanner: &mut Scanner<'_>) -> Result<PpoType, Problem> {
     let before = scanner.clone();
     let digits = scanner.take_while(|c| c.is_ascii_alphanumeric());
-    let number = digits.and_then(|own| own.value.parse().ok());
+    let number = digits.and_then(|digits| digits.value.parse().ok());
     let found = number.and_then(PpoType::from_number);
     found.ok_or_else(|| {
         *scanner = before;
@@ -136,17 +136,17 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let before = scanner.clone();
     // Some names begin with the number of a parameter.
     let name = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
-    let name = name.map_or("", |own| own.value);
+    let name = name.map_or("", |name| name.value);
     let Some(property) = Description::of(name) else {
         *scanner = before;
-        let known: Vec<_> = PROPERTIES.iter().map(|own| own.name).collect();
+        let known: Vec<_> = PROPERTIES.iter().map(|property| property.name).collect();
         let problem = scanner.unexpected("a property, such as pzd-invalid");
         return Err(problem.did_you_mean(name, &known));
     };
     scanner.eat("=");
     let before = scanner.clone();
     let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || "-.".contains(c));
-    let word = word.map_or("", |own| own.value);
+    let word = word.map_or("", |word| word.value);
     if property.set(&mut Properties::default(), word) {
         return Ok(SetupKind::Property(property, word.to_owned()));
     }

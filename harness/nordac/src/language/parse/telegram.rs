@@ -53,7 +53,7 @@ pub(super) fn flips(scanner: &mut Scanner<'_>, start: bool) -> Result<Flips, Pro
     loop {
         let mut ahead = scanner.clone();
         let word = ahead.take_while(|c| c.is_ascii_alphanumeric());
-        match word.map_or("", |own| own.value).as_bytes() {
+        match word.map_or("", |word| word.value).as_bytes() {
             [bit @ b'0'..=b'7'] => flips.data ^= 1 << (bit - b'0'),
             b"p" => flips.parity = true,
             b"s" => flips.stop = true,
@@ -71,7 +71,7 @@ pub(super) fn flips(scanner: &mut Scanner<'_>, start: bool) -> Result<Flips, Pro
 pub(super) fn byte(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
     let before = scanner.clone();
     let digits = scanner.take_while(|c| c.is_ascii_alphanumeric());
-    let digits = digits.map_or("", |own| own.value);
+    let digits = digits.map_or("", |digits| digits.value);
     let found = u8::from_str_radix(digits, 16).ok();
     found.filter(|_| digits.len() == 2).ok_or_else(|| {
         *scanner = before;

@@ -63,12 +63,13 @@ fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
     }
     let before = scanner.clone();
     if scanner.eat("\"") {
-        let name = scanner.take_while(|c| c != '"').map_or("", |own| own.value);
+        let name = scanner.take_while(|c| c != '"');
+        let name = name.map_or("", |name| name.value);
         if !scanner.eat("\"") {
             return Err(scanner.unexpected("`\"` behind the name of the parameter"));
         }
         return Parameter::named(name).map(Which::Named).map_err(|_| {
-            let names: Vec<_> = PARAMETERS.iter().map(|own| own.name).collect();
+            let names: Vec<_> = PARAMETERS.iter().map(|parameter| parameter.name).collect();
             *scanner = before;
             let problem = scanner.unexpected("a parameter");
             problem.help(match nearest(name, &names) {
@@ -78,7 +79,7 @@ fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
         });
     }
     let digits = scanner.take_while(|c| c.is_ascii_digit());
-    let number = digits.and_then(|own| own.value.parse().ok());
+    let number = digits.and_then(|digits| digits.value.parse().ok());
     number.map(Which::Numbered).ok_or_else(|| {
         *scanner = before;
         let problem = scanner.unexpected("a parameter: its number, or its name in quotation marks");
@@ -107,7 +108,7 @@ fn kind(scanner: &mut Scanner<'_>) -> Result<ValueKind, Problem> {
     let before = scanner.clone();
     let sign = if scanner.eat("-") { "-" } else { "" };
     let digits = scanner.take_while(|c| c.is_ascii_digit() || c == '.');
-    let digits = digits.map_or("", |own| own.value);
+    let digits = digits.map_or("", |digits| digits.value);
     let Some((number, places)) = decimal(digits) else {
         *scanner = before;
         return Err(scanner
@@ -115,7 +116,7 @@ fn kind(scanner: &mut Scanner<'_>) -> Result<ValueKind, Problem> {
     };
     let mut ahead = scanner.clone();
     let unit = ahead.take_while(|c| c.is_alphabetic() || "%/-1°".contains(c));
-    match unit.map(|own| own.value).filter(|own| *own != "error") {
+    match unit.map(|unit| unit.value).filter(|unit| *unit != "error") {
         None if places == 0 => Ok(ValueKind::Raw(if sign == "-" { -number } else { number })),
         None => {
             *scanner = before;

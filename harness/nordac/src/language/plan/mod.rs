@@ -68,7 +68,6 @@ pub(crate) enum PlannedAct {
     Job(u8, PlannedJob),
 }
 
-/// A job, settled.
 #[derive(Clone, Debug)]
 pub(crate) enum PlannedJob {
     /// Parameters, configuration and diagnosis.
@@ -80,7 +79,6 @@ pub(crate) enum PlannedJob {
     },
     /// One Data_Exchange.
     Exchange {
-        /// What is sent.
         send: Vec<(WordName, PlannedWord)>,
         /// What the reply must hold.
         expect: Vec<(WordName, PlannedWord)>,
@@ -95,7 +93,6 @@ pub(crate) enum PlannedJob {
     Off,
     /// Down the quick-stop ramp, and off.
     QuickStop,
-    /// A fault is acknowledged.
     Acknowledge,
 }
 
@@ -140,7 +137,7 @@ pub(super) fn settle(
         return Err(Problem::new(span, what, "as many `slave` lines expected"));
     }
     let rate = header.rate.unwrap_or_default();
-    let master = header.master.as_ref().map(|own| own.value);
+    let master = header.master.as_ref().map(|deviation| deviation.value);
     Ok(resume(&simulate::Setup {
         rate,
         slaves,
@@ -160,30 +157,30 @@ pub(super) fn resume(bench: &simulate::Setup) -> Planner {
 /// A header line about a slave. One about a slave that no line has named before adds it.
 fn apply(line: &SlaveLine, slaves: &mut Vec<SlaveSetup>) -> Result<(), Problem> {
     let address = address(&line.slave, Scope::default())?;
-    let place = slaves.iter().position(|own| own.address == address);
+    let place = slaves.iter().position(|slave| slave.address == address);
     let place = place.unwrap_or_else(|| {
         slaves.push(SlaveSetup::new(address));
         slaves.len() - 1
     });
-    let own = &mut slaves[place];
+    let slave = &mut slaves[place];
     match &line.what {
         SetupKind::There { ppo, posicon } => {
-            own.ppo = ppo.unwrap_or(own.ppo);
-            own.posicon |= posicon;
+            slave.ppo = ppo.unwrap_or(slave.ppo);
+            slave.posicon |= posicon;
         }
         SetupKind::Property(property, word) => {
-            if !property.set(&mut own.properties, word) {
+            if !property.set(&mut slave.properties, word) {
                 let what = format!("the property {} does not take this value", property.name);
                 return Err(Problem::new(line.span, what, "another value expected"));
             }
         }
-        SetupKind::Deviates(deviation) => own.deviation = Some(deviation),
+        SetupKind::Deviates(deviation) => slave.deviation = Some(deviation),
         SetupKind::Parameter(name, given) => {
             let parameter = parameter(name, Scope::default())?;
             let raw = raw(given, parameter, Scope::default())?;
             let known = parameter.listed(name.span)?;
-            own.parameters
-                .push((known, parameter.index, known.number_of(raw)));
+            let parameters = &mut slave.parameters;
+            parameters.push((known, parameter.index, known.number_of(raw)));
         }
     }
     Ok(())
@@ -202,8 +199,9 @@ pub(crate) fn address(slave: &Located, scope: Scope) -> Result<u8, Problem> {
 impl Planner {
     fn slave(&self, slave: &Located) -> Result<&SlaveSetup, Problem> {
         let address = address(slave, self.scope)?;
-        let own = self.bench.slaves.iter().find(|own| own.address == address);
-        own.ok_or_else(|| {
+        let mut slaves = self.bench.slaves.iter();
+        let found = slaves.find(|slave| slave.address == address);
+        found.ok_or_else(|| {
             let what = format!("the scenario has no slave {address}");
             let problem = Problem::new(slave.span, what, "a slave of the header expected here");
             problem.help(format!("add the line `slave {address}` to the header"))
@@ -218,11 +216,10 @@ impl Planner {
             Sender::Slave(slave) => self.slave(slave)?.address,
         };
         let mut slaves = self.bench.slaves.iter();
-        let place = slaves.position(|own| own.address == slave);
+        let place = slaves.position(|setup| setup.address == slave);
         Ok(place.map(|place| place + 1))
     }
 
-    /// A fault on the line.
     fn fault(
         &self,
         sender: &Sender,
@@ -230,7 +227,7 @@ impl Planner {
         fault: LineFault,
     ) -> Result<PlannedAct, Problem> {
         let value = number.value(self.scope)?;
-        let Some(value) = u64::try_from(value).ok().filter(|own| *own > 0) else {
+        let Some(value) = u64::try_from(value).ok().filter(|value| *value > 0) else {
             let what =
                 format!("there is no number {value}: bytes and telegrams are counted from 1");
             return Err(Problem::new(number.span, what, "1 or more expected here"));
@@ -252,7 +249,7 @@ impl Planner {
             Outside::Link(found) => Stimulus::Link(*found),
             Outside::Fault { number, on } => {
                 let number = number.as_ref();
-                let number = number.map(|own| up_to(own, 25, self.scope, "fault"));
+                let number = number.map(|fault| up_to(fault, 25, self.scope, "fault"));
                 let number = number.transpose()?.unwrap_or(simulate::ANY_FAULT.into());
                 Stimulus::Fault(u8::try_from(number).unwrap_or(0), *on)
             }
@@ -263,10 +260,10 @@ impl Planner {
     fn job(&self, job: &JobStep) -> Result<PlannedAct, Problem> {
         let slave = self.slave(&job.slave)?;
         let words = |words: &[(WordName, WordValue)]| {
-            let own = words
+            let planned = words
                 .iter()
                 .map(|(name, value)| Ok((*name, word(value, self.scope)?)));
-            own.collect::<Result<Vec<_>, Problem>>()
+            planned.collect::<Result<Vec<_>, Problem>>()
         };
         let planned = match &job.what {
             JobKind::Start { ppo, watchdog } => PlannedJob::Start {
@@ -274,13 +271,13 @@ impl Planner {
                 watchdog: watchdog.map(factors).transpose()?,
             },
             JobKind::Exchange { send, expect } => {
-                let unknown = send.iter().find(|(_, own)| match &own.kind {
+                let unknown = send.iter().find(|(_, value)| match &value.kind {
                     WordKind::Bytes(bytes) => bytes.contains(&None),
                     _ => false,
                 });
-                if let Some((_, own)) = unknown {
+                if let Some((_, value)) = unknown {
                     let what = "`xx` (any byte) is not allowed where every byte must be known";
-                    return Err(Problem::new(own.span, what, "`xx` can only be received"));
+                    return Err(Problem::new(value.span, what, "`xx` can only be received"));
                 }
                 PlannedJob::Exchange {
                     send: words(send)?,
@@ -288,20 +285,20 @@ impl Planner {
                 }
             }
             JobKind::Read(name, wanted) => {
-                let own = parameter(name, self.scope)?;
+                let named = parameter(name, self.scope)?;
                 let wanted = match wanted {
                     None => None,
                     Some(Wanted::Value(value)) => {
-                        Some(PlannedWanted::Value(raw(value, own, self.scope)?))
+                        Some(PlannedWanted::Value(raw(value, named, self.scope)?))
                     }
                     Some(Wanted::Error(number)) => Some(PlannedWanted::Error(self.error(number)?)),
                 };
-                PlannedJob::Read(own, wanted)
+                PlannedJob::Read(named, wanted)
             }
             JobKind::Write(name, value, error) => {
-                let own = parameter(name, self.scope)?;
+                let named = parameter(name, self.scope)?;
                 let error = error.as_ref().map(|number| self.error(number));
-                PlannedJob::Write(own, raw(value, own, self.scope)?, error.transpose()?)
+                PlannedJob::Write(named, raw(value, named, self.scope)?, error.transpose()?)
             }
             JobKind::On => PlannedJob::On,
             JobKind::Off => PlannedJob::Off,
@@ -320,7 +317,7 @@ impl Planner {
         let number = bad.octet.value(self.scope)?;
         let place = usize::try_from(number)
             .ok()
-            .filter(|own| (1..=octets).contains(own));
+            .filter(|place| (1..=octets).contains(place));
         let Some(place) = place else {
             let what = format!("the telegram has no byte {number}");
             let expected = format!("1 to {octets} expected here");
@@ -335,7 +332,6 @@ impl Planner {
 }
 
 impl Damage {
-    /// The bits that are wrong.
     fn flips(self) -> Flips {
         let none = Flips::default();
         match self {
@@ -384,7 +380,8 @@ impl Settle<Nordac> for Planner {
 
     fn send(&self, _port: usize, message: &Message) -> Result<Vec<SentTelegram>, Problem> {
         let octets = message.octets.expand_known(self.scope, MAX_CELLS)?;
-        let bad = message.bad.iter().map(|own| self.bad(own, octets.len()));
+        let bad = message.bad.iter();
+        let bad = bad.map(|damage| self.bad(damage, octets.len()));
         let bad = bad.collect::<Result<_, _>>()?;
         Ok(vec![SentTelegram { octets, bad }])
     }
@@ -393,8 +390,8 @@ impl Settle<Nordac> for Planner {
         let octets = message.octets.expand(self.scope, MAX_CELLS)?;
         let wanted = |octet| WantedOctet { octet, error: None };
         let mut wanted: Vec<_> = octets.into_iter().map(wanted).collect();
-        for own in &message.bad {
-            let (place, fault) = self.bad(own, wanted.len())?;
+        for damage in &message.bad {
+            let (place, fault) = self.bad(damage, wanted.len())?;
             let error = match fault {
                 LinkFault::Flip(flips) => flips.noticed(),
                 _ => None,
@@ -402,7 +399,7 @@ impl Settle<Nordac> for Planner {
             let Some(error) = error else {
                 let what = "a receiver does not notice this";
                 let expected = "`bad N` or `bad N stop` expected behind `<`";
-                return Err(Problem::new(own.octet.span, what, expected));
+                return Err(Problem::new(damage.octet.span, what, expected));
             };
             wanted[place].error = Some(error);
         }
@@ -445,12 +442,12 @@ impl Settle<Nordac> for Planner {
             }
             TelegramStep::Quiet => PlannedAct::Quiet,
             TelegramStep::Parameter(slave, name, value) => {
-                let own = parameter(name, self.scope)?;
-                own.listed(name.span)?;
+                let named = parameter(name, self.scope)?;
+                named.listed(name.span)?;
                 PlannedAct::Parameter(
                     self.slave(slave)?.address,
-                    own,
-                    raw(value, own, self.scope)?,
+                    named,
+                    raw(value, named, self.scope)?,
                 )
             }
             TelegramStep::Job(job) => self.job(job)?,
@@ -486,7 +483,7 @@ impl Settle<Nordac> for Planner {
             Action::Send { message, .. } => Some(message),
             _ => None,
         });
-        let damaged = sends.filter(|own| !own.bad.is_empty());
+        let damaged = sends.filter(|message| !message.bad.is_empty());
         let master = scenario.header.master.iter();
         needs
             .chain(master.map(|_| Capability::Simulator))

@@ -39,16 +39,16 @@ pub(super) fn up_to(number: &Located, most: i64, scope: Scope, what: &str) -> Re
 pub(super) fn parameter(name: &ParameterName, scope: Scope) -> Result<PlannedParameter, Problem> {
     let number = match &name.which {
         Which::Numbered(number) => i64::from(*number),
-        Which::Named(own) => own.number.into(),
+        Which::Named(parameter) => parameter.number.into(),
         Which::Counted(number) => number.value(scope)?,
     };
-    let fits = u16::try_from(number).ok().filter(|own| *own <= 0x7FF);
+    let fits = u16::try_from(number).ok().filter(|number| *number <= 0x7FF);
     let Some(number) = fits else {
         let what = format!("there is no parameter {number}: a PNU has 11 bits");
         return Err(Problem::new(name.span, what, "0 to 2047 expected here"));
     };
     let known = Parameter::of(number);
-    let by_set = known.is_some_and(|own| own.has(Flag::Set));
+    let by_set = known.is_some_and(|parameter| parameter.has(Flag::Set));
     let array = known.is_some_and(Parameter::is_array);
     let index = match (by_set, array, name.index.as_slice()) {
         (_, _, []) => Index::default(),
@@ -69,7 +69,7 @@ pub(super) fn parameter(name: &ParameterName, scope: Scope) -> Result<PlannedPar
             ..Index::default()
         },
         (_, _, more) => {
-            let span = more.last().map_or(name.span, |own| own.span);
+            let span = more.last().map_or(name.span, |index| index.span);
             let what = "too many numbers behind the parameter";
             let expected = "`.SET`, `.SUB-INDEX` or `.ELEMENT.SET` expected";
             return Err(Problem::new(span, what, expected));
@@ -85,7 +85,7 @@ pub(super) fn parameter(name: &ParameterName, scope: Scope) -> Result<PlannedPar
 /// A set, counted from 0.
 fn set_of(set: &Located, scope: Scope) -> Result<u8, Problem> {
     let number = up_to(set, 4, scope, "parameter set")?;
-    let counted = u8::try_from(number).ok().and_then(|own| own.checked_sub(1));
+    let counted = u8::try_from(number).ok().and_then(|set| set.checked_sub(1));
     counted.ok_or_else(|| Problem::new(set.span, "there is no set 0", "1 to 4 expected here"))
 }
 
@@ -130,7 +130,7 @@ impl PlannedParameter {
     #[must_use]
     pub(crate) fn name(&self) -> String {
         let number = self.number;
-        let name = self.known.map_or("not in the list", |own| own.name);
+        let name = self.known.map_or("not in the list", |known| known.name);
         format!("parameter {number} ({name})")
     }
 
@@ -149,7 +149,7 @@ impl PlannedParameter {
     /// IND of a task. A number that is not in the table has sub-indices at most.
     #[must_use]
     pub(crate) fn ind(&self) -> u16 {
-        let known = self.known.map(|own| self.index.ind(own));
+        let known = self.known.map(|known| self.index.ind(known));
         known.unwrap_or(self.index.element << 8)
     }
 
@@ -185,7 +185,7 @@ impl PlannedParameter {
     /// Whether its value has two words.
     #[must_use]
     pub(crate) fn is_long(&self) -> bool {
-        self.known.is_some_and(|own| own.has(Flag::Long))
+        self.known.is_some_and(|known| known.has(Flag::Long))
     }
 }
 

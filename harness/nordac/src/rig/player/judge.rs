@@ -8,6 +8,7 @@ use crate::rig::known::value_of;
 use crate::rig::observed::{Came, Turn};
 use crate::rig::settle::{Assumed, search};
 use crate::rig::talk::TalkError;
+use crate::value::hex;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::run::outcome::{Mismatch, Unready};
@@ -23,7 +24,7 @@ const LOST_BY_THE_LINE: usize = 2;
 
 impl Player {
     /// The outcome where the slaves could not be made ready.
-    pub(super) fn unanswered(&mut self, own: &Own, error: &TalkError, left: &Left) -> Outcome {
+    pub(super) fn unanswered(&mut self, scenario: &Own, error: &TalkError, left: &Left) -> Outcome {
         let remark = error.to_string();
         let exact = left.way.tolerance == Span::ZERO;
         let silent = matches!(error, TalkError::NoReply { .. });
@@ -43,13 +44,13 @@ impl Player {
             // Nothing was ever heard of it.
             _ if self.known.is_none() && !left.heard => Outcome::rig_error(remark),
             _ if self.known.is_none() => Outcome::not_ready(Verdict::Inconclusive, what, remark),
-            _ if exact && self.excused(own, left).is_none() => {
+            _ if exact && self.excused(scenario, left).is_none() => {
                 Outcome::not_ready(Verdict::Failed, what, remark)
             }
             TalkError::NoReply { .. } if !exact => {
                 Outcome::not_ready(Verdict::Failed, what, remark)
             }
-            _ => match self.differs(own, left) {
+            _ => match self.differs(scenario, left) {
                 Some(differs) if !exact => {
                     let said = said(&differs, &left.turns);
                     Outcome::not_ready(Verdict::Failed, what, format!("{remark}; {said}"))
@@ -61,23 +62,23 @@ impl Player {
     }
 
     /// What no right slave sends, where nothing that the line has lost or a stream has parted explains it.
-    fn differs(&mut self, own: &Own, left: &Left) -> Option<Differs> {
+    fn differs(&mut self, scenario: &Own, left: &Left) -> Option<Differs> {
         let turns = &left.turns;
         let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
-        let differs = sent.err().filter(|own| own.open.is_none())?;
-        self.lost(own, turns).is_none().then_some(differs)
+        let differs = sent.err().filter(|differs| differs.open.is_none())?;
+        self.lost(scenario, turns).is_none().then_some(differs)
     }
 
     /// Whether a line that was not met accuses the slave; behind an adapter, whether anything that it sent does.
-    pub(super) fn judged(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    pub(super) fn judged(&mut self, scenario: &Own, outcome: Outcome, left: &Left) -> Outcome {
         let judged = [Verdict::Passed, Verdict::Failed].contains(&outcome.verdict);
         if left.way.tolerance > Span::ZERO && judged {
-            return self.judged_by_times(own, outcome, left);
+            return self.judged_by_times(scenario, outcome, left);
         }
         if outcome.verdict != Verdict::Failed {
-            return outcome.judged_by(&own.plan);
+            return outcome.judged_by(&scenario.plan);
         }
-        match self.explained(own, left) {
+        match self.explained(scenario, left) {
             None => outcome,
             Some(with) => Outcome {
                 verdict: Verdict::Inconclusive,
@@ -92,7 +93,7 @@ impl Player {
     }
 
     /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
-    fn judged_by_times(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    fn judged_by_times(&mut self, scenario: &Own, outcome: Outcome, left: &Left) -> Outcome {
         let turns = &left.turns;
         let late = left.way.late.max(left.way.longest);
         let not_shown = |verdict, why: &str| {
@@ -104,7 +105,7 @@ impl Player {
             Err(Differs {
                 open: Some(why), ..
             }) => return not_shown(Verdict::Inconclusive, why),
-            Err(differs) => match self.lost(own, turns) {
+            Err(differs) => match self.lost(scenario, turns) {
                 None => return accused(outcome, &differs, turns),
                 Some(why) => {
                     let remarks = std::iter::once(why).chain(outcome.remarks);
@@ -116,7 +117,7 @@ impl Player {
                     };
                 }
             },
-            Ok(_) => drop(self.lost.remove(&own.name)),
+            Ok(_) => drop(self.lost.remove(&scenario.name)),
         }
         let Some(finding) = &outcome.finding else {
             return outcome;
@@ -125,7 +126,7 @@ impl Player {
             switches: left.switches,
             ..Other::default()
         };
-        let rehearsed = self.rehearse(own, &self.limits, other).turns;
+        let rehearsed = self.rehearse(scenario, &self.limits, other).turns;
         let shown = kinds(turns) == kinds(&rehearsed);
         if late > left.way.tolerance && !shown {
             return not_shown(
@@ -150,60 +151,63 @@ impl Player {
 
     /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
     /// there in the two attempts before is not lost by the line.
-    fn lost(&mut self, own: &Own, turns: &[Turn]) -> Option<String> {
+    fn lost(&mut self, scenario: &Own, turns: &[Turn]) -> Option<String> {
         let sent = right_slaves_send(self.known(), (self.rate, MOST_LOST), turns, &self.beats);
         let lost = match sent {
             Ok(lost) => lost,
-            Err(own) => return own.open.filter(|why| *why == TOO_MANY).map(str::to_owned),
+            Err(Differs { open, .. }) => {
+                return open.filter(|why| *why == TOO_MANY).map(str::to_owned);
+            }
         };
         let first = turns.get(*lost.first()?)?;
         let place = |number: usize| {
-            let step = turns.get(number).map(|own| own.step);
-            let same = turns[..number].iter().filter(|own| Some(own.step) == step);
+            let step = turns.get(number).map(|turn| turn.step);
+            let before = turns[..number].iter();
+            let same = before.filter(|turn| Some(turn.step) == step);
             (step.flatten(), same.count())
         };
-        let before = self.lost.remove(&own.name).unwrap_or_default();
+        let before = self.lost.remove(&scenario.name).unwrap_or_default();
         let times = |place| before.get(&place).copied().unwrap_or_default() + 1;
         let now: BTreeMap<_, _> = lost
             .into_iter()
             .map(place)
-            .map(|own| (own, times(own)))
+            .map(|turn| (turn, times(turn)))
             .collect();
         let again = now.values().any(|times| *times > LOST_BY_THE_LINE);
-        self.lost.insert(own.name.clone(), now);
+        self.lost.insert(scenario.name.clone(), now);
         (!again).then(|| {
             format!(
                 "no whole reply came to {}: the line may have lost it, and all else is what right slaves send",
-                hex(&first.octets)
+                words(&first.octets)
             )
         })
     }
 
     /// The same as [`Self::explained`], unless a slave was proven wrong before.
-    fn excused(&mut self, own: &Own, left: &Left) -> Option<String> {
+    fn excused(&mut self, scenario: &Own, left: &Left) -> Option<String> {
         if self.proven {
             return None;
         }
-        let excuse = self.explained(own, left);
+        let excuse = self.explained(scenario, left);
         self.proven = excuse.is_none() && self.slaves.len() == 1;
         excuse
     }
 
     /// In what right slaves that send the very same octets differ from what is known of the slaves; `None` if no right slaves send them.
-    fn explained(&self, own: &Own, left: &Left) -> Option<String> {
-        let base: Assumed = self.known().iter().map(|own| own.properties).collect();
+    fn explained(&self, scenario: &Own, left: &Left) -> Option<String> {
+        let base: Assumed = self.known().iter().map(|known| known.properties).collect();
         let open: Vec<Vec<_>> = self
             .known()
             .iter()
             .map(|known| {
                 PROPERTIES
                     .iter()
-                    .filter(|own| !known.is_settled(own))
+                    .filter(|property| !known.is_settled(property))
                     .collect()
             })
             .collect();
         let may = |place: usize, property: &Description| {
-            open[place].iter().any(|own| own.name == property.name)
+            open[place].iter().any(|point| point.name == property.name)
         };
         let came = |all: &Assumed| -> Came {
             let other = Other {
@@ -212,7 +216,7 @@ impl Player {
                 came: Some(&left.came),
                 ..Other::default()
             };
-            self.rehearse(own, &self.limits, other).came
+            self.rehearse(scenario, &self.limits, other).came
         };
         let found = search(&base, may, |all| came(all).agrees(&left.came));
         let (_, found) = found.into_iter().next()?;
@@ -234,9 +238,9 @@ fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
     let turn = turns.get(differs.turn);
     let message = said(differs, turns);
     let finding = match outcome.finding {
-        Some(own) => own,
+        Some(finding) => finding,
         None => {
-            let place = turn.and_then(|own| own.step).unwrap_or_default();
+            let place = turn.and_then(|turn| turn.step).unwrap_or_default();
             let span = TextSpan {
                 start: place,
                 end: place,
@@ -260,35 +264,33 @@ fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
 /// What the slave replied, and what a right one replies, in a sentence.
 fn said(differs: &Differs, turns: &[Turn]) -> String {
     let turn = turns.get(differs.turn);
-    let came: Vec<u8> = turn.map_or(Vec::new(), |own| {
-        own.came.iter().map(|own| *own as u8).collect()
+    let came: Vec<u8> = turn.map_or(Vec::new(), |turn| {
+        turn.came.iter().map(|octet| *octet as u8).collect()
     });
-    let asked = turn.map_or(Vec::new(), |own| own.octets.clone());
+    let asked = turn.map_or(Vec::new(), |turn| turn.octets.clone());
     format!(
         "the slave replies {} to {}, where a right one sends {}, or the same at another time that the record allows",
-        hex(&came),
-        hex(&asked),
-        hex(&differs.wanted)
+        words(&came),
+        words(&asked),
+        words(&differs.wanted)
     )
 }
 
-/// Octets in words.
-fn hex(octets: &[u8]) -> String {
-    if octets.is_empty() {
-        return "nothing".to_owned();
+fn words(octets: &[u8]) -> String {
+    match octets.is_empty() {
+        true => "nothing".to_owned(),
+        false => hex(octets),
     }
-    let all: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
-    all.join(" ")
 }
 
 /// The kinds of replies in a scenario: who sends what, and the states of the slaves, without what follows a motor or a clock.
 fn kinds(turns: &[Turn]) -> BTreeSet<String> {
-    let played = turns.iter().filter(|own| own.step.is_some());
+    let played = turns.iter().filter(|turn| turn.step.is_some());
     let kinds = played.map(|turn| {
-        let octets: Vec<u8> = turn.came.iter().map(|own| *own as u8).collect();
+        let octets: Vec<u8> = turn.came.iter().map(|octet| *octet as u8).collect();
         match Telegram::decode(&octets) {
             Decoded::Value { value, used } if used == octets.len() => kind(&value),
-            _ => hex(&octets),
+            _ => words(&octets),
         }
     });
     kinds.collect()

@@ -54,14 +54,12 @@ use std::sync::Arc;
 /// A scenario of this bus.
 #[derive(Clone, Debug)]
 pub(crate) struct Own {
-    /// The name of its source.
     name: String,
     scenario: Scenario<Nordac>,
     pub(super) plan: Plan<Nordac>,
 }
 
 impl Own {
-    /// Reads a scenario.
     pub(super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Nordac> = parse(source)?;
         let plan = plan(&scenario, source, None)?;
@@ -78,9 +76,7 @@ impl Own {
 enum AttemptCourse {
     /// The slaves are not known, or did not become ready.
     Unanswered(TalkError),
-    /// The rig does not play the scenario.
     Skipped(Skip),
-    /// It was played.
     Played(Box<Outcome>),
 }
 
@@ -126,13 +122,11 @@ pub(crate) struct Player {
     proven: bool,
     /// Why nothing can be played on simulated slaves.
     unable: Option<String>,
-    /// Whether the slaves are qualified.
     qualifies: bool,
     /// In how many attempts, one behind the other, something was lost behind a telegram: by scenario, and by step and place among its telegrams.
     lost: BTreeMap<String, BTreeMap<(Option<usize>, usize), usize>>,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
-    /// The attempts of a qualification.
     notes: Vec<SlaveNote>,
     behind: Behind,
 }
@@ -184,12 +178,10 @@ impl Player {
         self.qualifies = true;
     }
 
-    /// The attempts of a qualification.
     pub(super) fn notes(&self) -> &[SlaveNote] {
         &self.notes
     }
 
-    /// What may be done.
     pub(super) const fn limits(&self) -> &Limits {
         &self.limits
     }
@@ -205,8 +197,8 @@ impl Player {
     }
 
     /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
-    pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
-        lacks(&own.plan, &self.replay(&[], Span::ZERO))
+    pub(super) fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+        lacks(&scenario.plan, &self.replay(&[], Span::ZERO))
     }
 
     /// What was recorded of the rig, as a link.
@@ -228,7 +220,11 @@ impl Player {
 
     /// One attempt over a link: reads the slaves, rehearses, makes them ready, plays and judges. With what was received before the
     /// scenario, in words.
-    pub(super) fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+    pub(super) fn attempt(
+        &mut self,
+        scenario: &Arc<Own>,
+        link: &mut dyn Link,
+    ) -> (Outcome, String) {
         link.begin();
         let begun = self.qualifies.then(|| self.without_notes());
         let mut link = Observed::new(link);
@@ -238,10 +234,10 @@ impl Player {
                 let why = Why::OtherDrives(why.clone());
                 (AttemptCourse::Skipped(why.into()), false)
             }
-            None => self.go(own, &mut link, None),
+            None => self.go(scenario, &mut link, None),
         };
         if let Some(begun) = begun {
-            self.note(begun, own, (&link, switches), &gone);
+            self.note(begun, scenario, (&link, switches), &gone);
         }
         let left = Left {
             way: LinkTimes {
@@ -255,9 +251,9 @@ impl Player {
             turns: std::mem::take(&mut link.noted.turns),
         };
         let outcome = match gone {
-            AttemptCourse::Unanswered(error) => self.unanswered(own, &error, &left),
+            AttemptCourse::Unanswered(error) => self.unanswered(scenario, &error, &left),
             AttemptCourse::Skipped(skip) => Outcome::skipped(skip),
-            AttemptCourse::Played(outcome) => self.judged(own, *outcome, &left),
+            AttemptCourse::Played(outcome) => self.judged(scenario, *outcome, &left),
         };
         let outcome = match self.unlike.take() {
             Some(why) if exact && link.trouble().is_none() => {
@@ -280,7 +276,7 @@ impl Player {
     /// switched or not. With whether settings were switched.
     fn go(
         &mut self,
-        own: &Own,
+        scenario: &Own,
         link: &mut Observed<'_>,
         again: Option<bool>,
     ) -> (AttemptCourse, bool) {
@@ -288,9 +284,9 @@ impl Player {
         if let Err(error) = self.learn(link, again.is_none()) {
             return (AttemptCourse::Unanswered(error), false);
         }
-        let begun = match self.made_ready(own, link, again) {
+        let begun = match self.made_ready(scenario, link, again) {
             // What the slaves keep of the time before is another thing now.
-            Ok(MadeReady { faulted: true, .. }) => self.made_ready(own, link, again),
+            Ok(MadeReady { faulted: true, .. }) => self.made_ready(scenario, link, again),
             begun => begun,
         };
         let MadeReady {
@@ -308,7 +304,7 @@ impl Player {
             true => AtMismatch::GoOn,
             false => AtMismatch::Stop,
         };
-        let plan = shorter.as_ref().map_or(&own.plan, |own| &own.plan);
+        let plan = &shorter.as_ref().unwrap_or(scenario).plan;
         let outcome = play(plan, link, at_mismatch);
         (AttemptCourse::Played(Box::new(outcome)), switches)
     }
@@ -319,7 +315,7 @@ impl Player {
     /// What becomes of the attempt, and whether settings were switched.
     fn made_ready(
         &mut self,
-        own: &Own,
+        scenario: &Own,
         link: &mut Observed<'_>,
         again: Option<bool>,
     ) -> Result<MadeReady, Box<(AttemptCourse, bool)>> {
@@ -327,7 +323,7 @@ impl Player {
             move |error: TalkError| Box::new((AttemptCourse::Unanswered(error), switches))
         };
         let skipped = |skip: Skip| Box::new((AttemptCourse::Skipped(skip), false));
-        self.look(own, link).map_err(unanswered(false))?;
+        self.look(scenario, link).map_err(unanswered(false))?;
         let begun = match again {
             Some(switches) => Begun {
                 switches,
@@ -335,8 +331,8 @@ impl Player {
                 written: BTreeSet::new(),
             },
             None => {
-                let begun = self.rehearsed(own);
-                begun.map_err(|why| skipped(Skip::from(why).and(self.unlocks(own))))?
+                let begun = self.rehearsed(scenario);
+                begun.map_err(|why| skipped(Skip::from(why).and(self.unlocks(scenario))))?
             }
         };
         let taken = self.other_station(&begun.moved, link);
@@ -348,9 +344,9 @@ impl Player {
         }
         let switches = begun.switches;
         let real = link.time_tolerance() > Span::ZERO;
-        let shorter = (self.qualifies && real).then(|| self.shortened(own, switches));
+        let shorter = (self.qualifies && real).then(|| self.shortened(scenario, switches));
         link.noted.begin_fresh();
-        let ready = self.prepare(own, link, switches);
+        let ready = self.prepare(scenario, link, switches);
         self.before = Some(link.noted.received());
         let faulted = ready.map_err(unanswered(switches))?;
         Ok(MadeReady {
@@ -382,10 +378,10 @@ impl Player {
         let came = |came: Came| if exact { came } else { came.at_any_time() };
         for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
             let seen = came(seen);
-            let conversed = |own| came(self.conversed(known, own, (&seen, exact)));
+            let conversed = |slaves| came(self.conversed(known, slaves, (&seen, exact)));
             // What a slave sends follows from parameters too, and without a parameter channel those are not known.
             let is_read = known.ppo().has_pkw();
-            match is_read.then(|| settle::settle(|own| conversed(own).agrees(&seen))) {
+            match is_read.then(|| settle::settle(|slaves| conversed(slaves).agrees(&seen))) {
                 None => {}
                 Some(Some(settled)) => (known.properties, known.open) = settled,
                 // Every value of every point stays open.
@@ -404,15 +400,15 @@ impl Player {
     }
 
     /// Reads what the slaves of a scenario keep of the time before. Simulated ones are switched off and on for each scenario.
-    fn look(&mut self, own: &Own, link: &mut Observed<'_>) -> Result<(), TalkError> {
+    fn look(&mut self, scenario: &Own, link: &mut Observed<'_>) -> Result<(), TalkError> {
         if self.restarts {
             return Ok(());
         }
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
         for known in self.known.iter_mut().flatten() {
             let address = known.slave.address;
-            let mut slaves = own.plan.setup.slaves.iter();
-            if slaves.any(|own| own.address == address) {
+            let mut slaves = scenario.plan.setup.slaves.iter();
+            if slaves.any(|slave| slave.address == address) {
                 talk.restart(address);
                 let now = known.read_history(&mut talk)?;
                 // No word of the bus changes the one in force while the terminals control a right slave (2.5.1, interface 0, 1 and 4).
@@ -492,9 +488,9 @@ impl Player {
     /// A bench of simulated slaves behind the gate of the rig. They were asked as when a rig is opened.
     fn model(&self, slaves: Vec<simulate::SlaveSetup>, limits: &Limits) -> Guarded<Bench> {
         self.beats.beat();
-        let gated = slaves.iter().map(|own| GuardedSlave {
-            address: own.address,
-            ppo: Some(own.ppo),
+        let gated = slaves.iter().map(|slave| GuardedSlave {
+            address: slave.address,
+            ppo: Some(slave.ppo),
         });
         let gated: Vec<_> = gated.collect();
         let setup = simulate::Setup {

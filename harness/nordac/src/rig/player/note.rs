@@ -34,7 +34,6 @@ pub(crate) enum Other {
     WrongSlave(usize, &'static Deviation),
 }
 
-/// One attempt.
 #[derive(Clone, Debug)]
 pub(crate) struct SlaveNote {
     own: Arc<Own>,
@@ -50,7 +49,6 @@ pub(crate) struct SlaveNote {
     noted: Noted,
 }
 
-/// What an attempt has shown.
 #[derive(Clone, Debug, PartialEq)]
 struct AttemptShown {
     /// Why the slaves were not ready.
@@ -69,16 +67,16 @@ impl AttemptShown {
             AttemptCourse::Unanswered(error) => (Some(error.clone()), None),
             AttemptCourse::Skipped(_) => (None, None),
             AttemptCourse::Played(outcome) => {
-                let place = outcome.finding.as_ref().map(|own| own.span.start);
+                let place = outcome.finding.as_ref().map(|finding| finding.span.start);
                 (None, Some((outcome.verdict, place)))
             }
         };
         let came = link.noted.all();
         let mut telegrams: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (head, contents) in came.telegrams().iter().filter(|_| !exact).map(meaning) {
-            let own = telegrams.entry(head).or_default();
-            if own.last() != Some(&contents) {
-                own.push(contents);
+            let all = telegrams.entry(head).or_default();
+            if all.last() != Some(&contents) {
+                all.push(contents);
             }
         }
         Self {
@@ -122,7 +120,7 @@ fn image(pdu: &Pdu) -> Option<Image> {
     let exchanged = Service::of(pdu.ssap()) == Some(Service::DataExchange);
     let ppo = PpoType::ALL
         .into_iter()
-        .find(|own| own.octets() == pdu.data().len());
+        .find(|ppo| ppo.octets() == pdu.data().len());
     Image::decode(ppo.filter(|_| exchanged)?, pdu.data())
 }
 
@@ -141,7 +139,6 @@ fn meaning(telegram: &Telegram) -> (String, String) {
 }
 
 impl SlaveNote {
-    /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
         // What was not shown is shown by another attempt, or not at all.
         self.noted.verdict = match outcome.unready {
@@ -168,7 +165,7 @@ impl SlaveNote {
         place: usize,
         property: &Description,
     ) -> Vec<String> {
-        let base: Assumed = known.iter().map(|own| own.properties).collect();
+        let base: Assumed = known.iter().map(|known| known.properties).collect();
         let none = Values::new();
         let explains = |word: &String| {
             let mut all = base.clone();
@@ -233,7 +230,7 @@ impl SlaveNote {
     }
 
     fn is_shown_by(&self, other: Other, held: &Values) -> bool {
-        let base: Assumed = self.slaves.iter().map(|own| own.properties).collect();
+        let base: Assumed = self.slaves.iter().map(|known| known.properties).collect();
         if let Other::WrongSlave(..) = other {
             return self.shown_by(other, &base, held) == self.shown;
         }
@@ -245,8 +242,8 @@ impl SlaveNote {
             .slaves
             .iter()
             .map(|known| {
-                let open = PROPERTIES.iter().filter(|own| !known.is_settled(own));
-                open.map(|own| own.name).collect()
+                let open = PROPERTIES.iter().filter(|row| !known.is_settled(row));
+                open.map(|row| row.name).collect()
             })
             .collect();
         let may = |place: usize, property: &Description| open[place].contains(&property.name);
@@ -283,7 +280,7 @@ impl SlaveNote {
     fn shown_by(&self, other: Other, properties: &Assumed, held: &Values) -> AttemptShown {
         let mut last = self.played_by((other, held), properties, None);
         // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
-        if last != self.shown && self.slaves.iter().any(|own| own.values.is_empty()) {
+        if last != self.shown && self.slaves.iter().any(|slave| slave.values.is_empty()) {
             last = self.played_by((other, held), properties, Some(2));
         }
         last
@@ -300,13 +297,13 @@ impl SlaveNote {
         let slaves = slaves.map(|(place, (known, properties))| {
             let mut slave: SlaveSetup = known.model(*properties);
             let control = Parameter::of(INTERFACE).zip(interface);
-            let control = control.map(|(own, value)| (own, Index::default(), value));
+            let control = control.map(|(parameter, value)| (parameter, Index::default(), value));
             slave.parameters.extend(control);
-            if let Other::WrongSlave(own, deviation) = other {
-                slave.deviation = (own == place).then_some(deviation);
+            if let Other::WrongSlave(wrong, deviation) = other {
+                slave.deviation = (wrong == place).then_some(deviation);
                 slave
                     .parameters
-                    .extend(stated(held).filter(|_| own == place));
+                    .extend(stated(held).filter(|_| wrong == place));
             }
             slave
         });
@@ -340,8 +337,14 @@ impl Note for SlaveNote {
         deviations().collect()
     }
 
-    fn words(own: &Deviation) -> String {
-        format!("{} (NORDAC {}): {}", own.name, own.section, own.about)
+    fn words(deviation: &Deviation) -> String {
+        let Deviation {
+            name,
+            section,
+            about,
+            ..
+        } = deviation;
+        format!("{name} (NORDAC {section}): {about}")
     }
 
     fn noted(&self) -> &Noted {
@@ -350,7 +353,9 @@ impl Note for SlaveNote {
 
     fn drives(&self) -> Vec<String> {
         let slaves = self.begun.slaves.iter();
-        slaves.map(|own| format!("slave {}", own.address)).collect()
+        slaves
+            .map(|slave| format!("slave {}", slave.address))
+            .collect()
     }
 
     fn is_right(&self) -> bool {
@@ -397,14 +402,14 @@ impl Player {
     pub(super) fn note(
         &mut self,
         begun: Self,
-        own: &Arc<Own>,
+        scenario: &Arc<Own>,
         (link, switches): (&Observed<'_>, bool),
         gone: &AttemptCourse,
     ) {
         let exact = link.time_tolerance() == Span::ZERO;
         let shown = AttemptShown::of(gone, link, exact);
         self.notes.push(SlaveNote {
-            own: Arc::clone(own),
+            own: Arc::clone(scenario),
             begun,
             slaves: self.known.as_ref().unwrap_or(&self.partly).clone(),
             switches,
@@ -413,7 +418,7 @@ impl Player {
                 false => link.noted.turns.clone(),
             },
             noted: Noted {
-                name: own.name.clone(),
+                name: scenario.name.clone(),
                 verdict: Verdict::Skipped,
                 accuses: false,
                 exact,

@@ -32,17 +32,17 @@ impl Player {
     /// came meanwhile, which the memory of a slave holds since then (5.7): one of a time-out, where the computer stood still before.
     pub(super) fn prepare(
         &self,
-        own: &Own,
+        scenario: &Own,
         link: &mut Observed<'_>,
         switches: bool,
     ) -> Result<bool, TalkError> {
         let mut faulted = false;
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
-        for slave in &own.plan.setup.slaves {
+        for slave in &scenario.plan.setup.slaves {
             let known = self
                 .known()
                 .iter()
-                .find(|own| own.slave.address == slave.address);
+                .find(|known| known.slave.address == slave.address);
             let Some(known) = known else { continue };
             let (address, ppo) = (slave.address, known.ppo());
             talk.restart(address);
@@ -73,7 +73,7 @@ impl Player {
         match self.restarts {
             true => {
                 drop(talk);
-                for slave in &own.plan.setup.slaves {
+                for slave in &scenario.plan.setup.slaves {
                     for fault in [DriveFault::Off, DriveFault::On] {
                         let fault = PlacedFault::Drive(slave.address, fault);
                         link.inject(0, fault, Moment::Now);
@@ -82,16 +82,16 @@ impl Player {
                 link.noted.begin_fresh();
                 // A slave that looks for the rate may miss the first telegram (`autobaud`); a request for its status changes nothing.
                 let mut talk = Talk::new(Box::new(&mut *link), self.patience);
-                for slave in &own.plan.setup.slaves {
+                for slave in &scenario.plan.setup.slaves {
                     talk.status(slave.address)?;
                 }
             }
             false => {
-                for slave in &own.plan.setup.slaves {
+                for slave in &scenario.plan.setup.slaves {
                     let known = self
                         .known()
                         .iter()
-                        .find(|own| own.slave.address == slave.address);
+                        .find(|known| known.slave.address == slave.address);
                     let ppo = match switches {
                         true => slave.ppo,
                         false => known.map(Known::ppo).unwrap_or_default(),
@@ -110,7 +110,7 @@ impl Player {
                 if !self.limits.bus_settings {
                     talk.pass(FORGOTTEN)?;
                 }
-                for slave in &own.plan.setup.slaves {
+                for slave in &scenario.plan.setup.slaves {
                     talk.restart(slave.address);
                     talk.diagnose(slave.address)?;
                 }

@@ -55,7 +55,6 @@ pub(in crate::rig) struct Begun {
     pub(super) switches: bool,
     /// The addresses that it gives to slaves: the slave, and its new one.
     pub(in crate::rig) moved: BTreeSet<(u8, u8)>,
-    /// What it writes.
     pub(in crate::rig) written: BTreeSet<Written>,
 }
 
@@ -69,7 +68,6 @@ pub(super) struct Rehearsal {
     lost: Option<String>,
     /// The addresses that it gives to slaves.
     moved: BTreeSet<(u8, u8)>,
-    /// What it writes.
     written: BTreeSet<Written>,
     /// What came from the first telegram on that makes the slaves ready.
     pub(super) came: Came,
@@ -88,8 +86,9 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    pub(super) fn rehearsed(&self, own: &Own) -> Result<Begun, Why> {
-        let other = self.other_port(own).or_else(|| self.other_properties(own));
+    pub(super) fn rehearsed(&self, scenario: &Own) -> Result<Begun, Why> {
+        let other = self.other_port(scenario);
+        let other = other.or_else(|| self.other_properties(scenario));
         if let Some(why) = other {
             return Err(Why::OtherDrives(why));
         }
@@ -97,13 +96,13 @@ impl Player {
             switches,
             ..Other::default()
         };
-        let first = self.rehearse_all(own, with(false));
+        let first = self.rehearse_all(scenario, with(false));
         if first.passes() {
             return self.begins(first, false);
         }
         let permitted = may_switch_settings(&self.limits);
         if permitted {
-            let switched = self.rehearse_all(own, with(true));
+            let switched = self.rehearse_all(scenario, with(true));
             if switched.passes() {
                 return self.begins(switched, true);
             }
@@ -117,14 +116,14 @@ impl Player {
             bus_settings: true,
             ..self.limits
         };
-        let why = if !permitted && self.rehearse(own, &all, with(true)).passes() {
+        let why = if !permitted && self.rehearse(scenario, &all, with(true)).passes() {
             "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
              --allow-motion, `allow_eeprom` and `allow_bus_settings`"
                 .to_owned()
-        } else if let Some(kept) = self.keeps_too_much(own, permitted) {
+        } else if let Some(kept) = self.keeps_too_much(scenario, permitted) {
             kept
         } else {
-            let finding = first.outcome.finding.map(|own| own.message);
+            let finding = first.outcome.finding.map(|finding| finding.message);
             let remark = first.outcome.remarks.into_iter().next();
             let found = finding.or(remark).unwrap_or_default();
             format!("a right slave with the same parameters does not meet it: {found}")
@@ -152,30 +151,30 @@ impl Player {
 
     /// Plays a scenario on the model with what was read of the slaves; where they had faults before, with other fault memories too: what these
     /// hold is not known, and a scenario that would show it is not met.
-    fn rehearse_all(&self, own: &Own, other: Other<'_>) -> Rehearsal {
-        let mut played = self.rehearse(own, &self.limits, other);
+    fn rehearse_all(&self, scenario: &Own, other: Other<'_>) -> Rehearsal {
+        let mut played = self.rehearse(scenario, &self.limits, other);
         let had_faults = self
             .known()
             .iter()
-            .any(|own| !own.history.faults.is_empty());
+            .any(|known| !known.history.faults.is_empty());
         for past in PAST_FAULTS.iter().filter(|_| had_faults) {
             if played.passes() {
                 let past = Past::Faults(past);
-                played = self.rehearse(own, &self.limits, Other { past, ..other });
+                played = self.rehearse(scenario, &self.limits, Other { past, ..other });
             }
         }
         played
     }
 
     /// What the slaves keep of the time before, where that alone keeps a scenario from being played.
-    fn keeps_too_much(&self, own: &Own, permitted: bool) -> Option<String> {
+    fn keeps_too_much(&self, scenario: &Own, permitted: bool) -> Option<String> {
         let kept = self.known().iter().filter_map(|known| {
             let word = known
                 .history
                 .stw
-                .map(|own| format!("control word {own:04X} is in force (967)"));
+                .map(|word| format!("control word {word:04X} is in force (967)"));
             let fault = known.history.faults.first();
-            let fault = fault.map(|own| format!("fault {own} was its last one (947)"));
+            let fault = fault.map(|fault| format!("fault {fault} was its last one (947)"));
             let all: Vec<_> = word.into_iter().chain(fault).collect();
             (!all.is_empty()).then(|| format!("slave {}: {}", known.slave.address, all.join(", ")))
         });
@@ -187,7 +186,7 @@ impl Player {
                 switches,
                 ..Other::default()
             };
-            self.rehearse(own, &self.limits, other).passes()
+            self.rehearse(scenario, &self.limits, other).passes()
         };
         let fresh = !kept.is_empty() && (meets(false) || permitted && meets(true));
         fresh.then(|| {
@@ -200,7 +199,7 @@ impl Player {
 
     /// Why slaves could not be put back behind a scenario that was played on their model.
     fn loses(&self, bench: &Bench, moved: &BTreeSet<(u8, u8)>) -> Option<String> {
-        let taken = |to: u8| to == MASTER || self.slaves.iter().any(|own| own.address == to);
+        let taken = |to: u8| to == MASTER || self.slaves.iter().any(|slave| slave.address == to);
         let moved = moved.iter().find(|(slave, to)| slave != to && taken(*to));
         if let Some((slave, to)) = moved {
             return Some(format!(
@@ -221,12 +220,12 @@ impl Player {
     }
 
     /// What of the line and of the addresses and PPO types of its slaves is another than the scenario has, and is not switched.
-    fn other_port(&self, own: &Own) -> Option<String> {
-        let bench = &own.plan.setup;
+    fn other_port(&self, scenario: &Own) -> Option<String> {
+        let bench = &scenario.plan.setup;
         for slave in &bench.slaves {
             let address = slave.address;
             let mut known = self.known().iter();
-            let Some(known) = known.find(|own| own.slave.address == address) else {
+            let Some(known) = known.find(|known| known.slave.address == address) else {
                 return Some(format!("the rig has no slave {address}"));
             };
             if !self.may_switch(known.ppo(), slave.ppo) {
@@ -248,7 +247,7 @@ impl Player {
                 ));
             }
         }
-        let other = own.scenario.header.rate.is_some() && bench.rate != self.rate;
+        let other = scenario.scenario.header.rate.is_some() && bench.rate != self.rate;
         other.then(|| {
             format!(
                 "the rig's line has {} kbit/s, that of the scenario {}",
@@ -259,16 +258,16 @@ impl Player {
     }
 
     /// The first property of the header of which a slave of the rig has another value, as far as is known.
-    fn other_properties(&self, own: &Own) -> Option<String> {
-        let lines = own.scenario.header.slaves.iter();
+    fn other_properties(&self, scenario: &Own) -> Option<String> {
+        let lines = scenario.scenario.header.slaves.iter();
         let mut named = lines.filter_map(|line| match &line.what {
             syntax::SetupKind::Property(property, _) => Some(*property),
             _ => None,
         });
         named.find_map(|property| {
-            own.plan.setup.slaves.iter().find_map(|slave| {
+            scenario.plan.setup.slaves.iter().find_map(|slave| {
                 let address = slave.address;
-                let known = self.known().iter().find(|own| own.slave.address == address)?;
+                let known = self.known().iter().find(|known| known.slave.address == address)?;
                 let wanted = value_of(property, &slave.properties);
                 let has = value_of(property, &known.properties);
                 let name = property.name;
@@ -279,7 +278,7 @@ impl Player {
     }
 
     /// Plays a scenario on the model within limits.
-    pub(super) fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+    pub(super) fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
         let known = self.known().iter().enumerate();
         let slaves = known.map(|(place, known)| {
             let properties = other.properties.and_then(|all| all.get(place));
@@ -299,14 +298,14 @@ impl Player {
         let mut recording = Recording::new(&mut link, &mut forgotten);
         recording.begin();
         let mut observed = Observed::new(&mut recording);
-        let ready = self.prepare(own, &mut observed, other.switches);
+        let ready = self.prepare(scenario, &mut observed, other.switches);
         let outcome = match ready {
             Ok(_) => {
                 observed.begin();
                 if let Some(came) = other.came {
                     observed.noted.expect(came, observed.noted.fresh, true);
                 }
-                play(&own.plan, &mut observed, AtMismatch::Stop)
+                play(&scenario.plan, &mut observed, AtMismatch::Stop)
             }
             Err(TalkError::Line(trouble)) => Outcome::trouble(&trouble),
             Err(error) => {
@@ -318,10 +317,10 @@ impl Player {
         let turns = std::mem::take(&mut observed.noted.turns);
         let moved = std::mem::take(&mut observed.noted.moved);
         let written = std::mem::take(&mut observed.noted.written);
-        let faulted = self.known().iter().map(|own| own.slave.address);
+        let faulted = self.known().iter().map(|known| known.slave.address);
         let faulted = faulted.into_iter().find(|slave| {
             let drive = link.inner().drive(*slave);
-            drive.is_some_and(|own| own.inverter().state() == State::Fault)
+            drive.is_some_and(|drive| drive.inverter().state() == State::Fault)
         });
         let denied = match link.trouble() {
             Some(Trouble::Denied(why)) => Some(why.clone()),

@@ -22,21 +22,21 @@ const SLACK: Span = Span::from_millis(100);
 
 impl Player {
     /// The same scenario with waits that are as long as right slaves need for the same replies.
-    pub(super) fn shortened(&self, own: &Own, switches: bool) -> Own {
-        let played = |own: &Own| {
+    pub(super) fn shortened(&self, scenario: &Own, switches: bool) -> Own {
+        let played = |shorter: &Own| {
             let other = Other {
                 switches,
                 ..Other::default()
             };
-            let rehearsal = self.rehearse(own, &self.limits, other);
+            let rehearsal = self.rehearse(shorter, &self.limits, other);
             rehearsal.passes().then(|| replies(&rehearsal.turns))
         };
-        let mut shorter = own.clone();
-        let Some(whole) = played(own) else {
+        let mut shorter = scenario.clone();
+        let Some(whole) = played(scenario) else {
             return shorter;
         };
-        for place in 0..own.plan.steps.len() {
-            let PlannedAction::Wait(wait) = own.plan.steps[place].action else {
+        for place in 0..scenario.plan.steps.len() {
+            let PlannedAction::Wait(wait) = scenario.plan.steps[place].action else {
                 continue;
             };
             if wait < LEAST {
@@ -71,6 +71,6 @@ impl Player {
 /// What was sent, and what came.
 fn replies(turns: &[Turn]) -> Vec<(Vec<u8>, Vec<u16>)> {
     let all = turns.iter();
-    all.map(|own| (own.octets.clone(), own.came.clone()))
+    all.map(|turn| (turn.octets.clone(), turn.came.clone()))
         .collect()
 }

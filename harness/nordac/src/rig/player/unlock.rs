@@ -71,11 +71,11 @@ impl Setting {
 impl Player {
     /// What in the rig's file would together let a scenario be played, as far as the model shows it: with all of this it is played, with less of
     /// it is not. Nothing where no file would.
-    pub(super) fn unlocks(&self, own: &Own) -> BTreeSet<Unlock> {
-        let Some((mut other, mut unlocks)) = self.at_another_port(own) else {
+    pub(super) fn unlocks(&self, scenario: &Own) -> BTreeSet<Unlock> {
+        let Some((mut other, mut unlocks)) = self.at_another_port(scenario) else {
             return BTreeSet::new();
         };
-        if other.rehearsed(own).is_err() {
+        if other.rehearsed(scenario).is_err() {
             return BTreeSet::new();
         }
         for setting in Setting::ALL {
@@ -84,7 +84,7 @@ impl Player {
                 continue;
             }
             let more = std::mem::replace(&mut other.limits, less);
-            if other.rehearsed(own).is_err() {
+            if other.rehearsed(scenario).is_err() {
                 other.limits = more;
                 unlocks.insert(setting.unlock(&self.limits));
             }
@@ -95,8 +95,8 @@ impl Player {
     /// The same rig without limits, at a line with the rate of a scenario, and with its slaves; and what in `[port.1]` is changed for that.
     /// A slave of which nothing was read is as delivered, with the bus in control. `None` where no rig has
     /// such a slave, or where its parameters cannot be read.
-    fn at_another_port(&self, own: &Own) -> Option<(Self, BTreeSet<Unlock>)> {
-        let setup = &own.plan.setup;
+    fn at_another_port(&self, scenario: &Own) -> Option<(Self, BTreeSet<Unlock>)> {
+        let setup = &scenario.plan.setup;
         let mut other = Self::of(
             self.slaves.clone(),
             self.rate,
@@ -106,16 +106,16 @@ impl Player {
         );
         other.beats = self.beats.clone();
         let mut unlocks = BTreeSet::new();
-        if own.scenario.header.rate.is_some() && setup.rate != self.rate {
+        if scenario.scenario.header.rate.is_some() && setup.rate != self.rate {
             other.rate = setup.rate;
             unlocks.insert(Unlock::Port(format!("`rate = {}`", setup.rate.name())));
         }
         let mut all = self.known().to_vec();
         for slave in &setup.slaves {
             let address = slave.address;
-            let listed = all.iter().find(|own| own.slave.address == address);
+            let listed = all.iter().find(|known| known.slave.address == address);
             let fits = |ppo: PpoType| ppo.has_pkw() && other.may_switch(ppo, slave.ppo);
-            if listed.is_some_and(|own| fits(own.ppo())) {
+            if listed.is_some_and(|known| fits(known.ppo())) {
                 continue;
             }
             // The bench's own master has its address.
@@ -124,7 +124,7 @@ impl Player {
             }
             let ppo = [slave.ppo, PpoType::default()]
                 .into_iter()
-                .find(|own| fits(*own))?;
+                .find(|ppo| fits(*ppo))?;
             let wanted = RigSlave {
                 address,
                 ppo: Some(ppo),
@@ -134,7 +134,7 @@ impl Player {
             if known.values.is_empty() {
                 Arc::make_mut(&mut known.values).insert((INTERFACE, 0), 2);
             }
-            all.retain(|own| own.slave.address != address);
+            all.retain(|known| known.slave.address != address);
             all.push(known);
             let ppo = ppo.number();
             let words = format!("a drive `{{ address = {address}, ppo = {ppo} }}`");

@@ -63,11 +63,11 @@ pub(super) fn right_slaves_send(
 ) -> Result<Vec<usize>, Differs> {
     let talk = Talk::new(rate, turns, most_lost);
     let slaves = |all: &Assumed| -> Vec<SlaveSetup> {
-        let slaves = known.iter().zip(all);
-        slaves.map(|(known, own)| known.model(*own)).collect()
+        let slaves = known.iter().zip(all.iter().copied());
+        slaves.map(|(known, open)| known.model(open)).collect()
     };
     let send = |slaves: &[SlaveSetup]| talk.sent_by(slaves, &|| beats.beat());
-    let base: Assumed = known.iter().map(|own| own.properties).collect();
+    let base: Assumed = known.iter().map(|known| known.properties).collect();
     let first = send(&slaves(&base));
     if first.is_ok() {
         return first;
@@ -78,9 +78,9 @@ pub(super) fn right_slaves_send(
     let found = search(&base, may, |all| {
         beats.beat();
         let slaves = slaves(all);
-        let latest = talk.talk.sent.iter().map(|own| own.latest);
-        let own = explained.entry(talk.said(Line::new(&slaves), latest));
-        *own.or_insert_with(|| agreement(&send(&slaves)))
+        let latest = talk.talk.sent.iter().map(|request| request.latest);
+        let agreed = explained.entry(talk.said(Line::new(&slaves), latest));
+        *agreed.or_insert_with(|| agreement(&send(&slaves)))
     });
     match found.first() {
         None => first,
@@ -92,7 +92,7 @@ pub(super) fn right_slaves_send(
 fn agreement(found: &Result<Vec<usize>, Differs>) -> Agreement {
     match found {
         Ok(_) => WHOLE,
-        Err(own) => own.turn * 1024 + own.agreed.min(1023),
+        Err(differs) => differs.turn * 1024 + differs.agreed.min(1023),
     }
 }
 
@@ -132,12 +132,12 @@ impl Talk {
         });
         let sent: Vec<_> = sent.collect();
         let (came, places) = came(turns, most_lost > 0);
-        let end = sent.iter().map(|own| own.latest).max();
+        let end = sent.iter().map(|request| request.latest).max();
         Self {
             talk: Dialogue {
                 sent,
                 came,
-                asked: places.iter().map(|own| own + 1).collect(),
+                asked: places.iter().map(|turn| turn + 1).collect(),
                 end: end.unwrap_or_default(),
                 lag: Span::ZERO,
                 overtakes: false,
@@ -148,7 +148,7 @@ impl Talk {
             },
             closely: most_lost == 0,
             turns: places,
-            left: turns.iter().map(|own| own.left).collect(),
+            left: turns.iter().map(|turn| turn.left).collect(),
         }
     }
 
@@ -156,9 +156,9 @@ impl Talk {
     fn within(&self, millis: u64) -> Dialogue<Piece> {
         let mut talk = self.talk.clone();
         let more = Span::from_millis(millis);
-        for own in talk.sent.iter_mut().chain(&mut talk.came) {
-            own.earliest = own.earliest - more;
-            own.latest += more;
+        for piece in talk.sent.iter_mut().chain(&mut talk.came) {
+            piece.earliest = piece.earliest - more;
+            piece.latest += more;
         }
         talk.end += more;
         talk
@@ -198,18 +198,18 @@ impl Talk {
             Err((Judged::Wrong(place, expected), _)) => (Some(place), expected),
             Err(_) => (None, None),
         };
-        let before = &came[..place.map_or(0, |own| came.len().min(own + 1))];
-        let torn = before.iter().any(|own| own.piece.begun);
-        let wanted = expected.map_or(Vec::new(), |own| own.octets);
-        let octets = place.and_then(|own| Some(&came.get(own)?.piece.octets));
+        let before = &came[..place.map_or(0, |place| came.len().min(place + 1))];
+        let torn = before.iter().any(|reply| reply.piece.begun);
+        let wanted = expected.map_or(Vec::new(), |piece| piece.octets);
+        let octets = place.and_then(|place| Some(&came.get(place)?.piece.octets));
         let octets = octets.into_iter().flatten();
         let last = self.talk.sent.len().saturating_sub(1);
         Err(Differs {
-            turn: place.map_or(0, |own| self.turns.get(own).copied().unwrap_or(last)),
+            turn: place.map_or(0, |place| self.turns.get(place).copied().unwrap_or(last)),
             agreed: wanted
                 .iter()
                 .zip(octets)
-                .take_while(|own| own.0 == own.1)
+                .take_while(|pair| pair.0 == pair.1)
                 .count(),
             wanted: narrow(&wanted),
             open: match place {
@@ -228,12 +228,13 @@ fn read_by(turns: &[Turn], number: usize) -> Instant {
         let function = telegram.pdu()?.fc().function()?;
         Some(used == turn.octets.len() && !function.is_sdn())
     };
-    let silent = turns[number..].iter().take_while(|own| own.came.is_empty());
+    let from_here = turns[number..].iter();
+    let silent = from_here.take_while(|turn| turn.came.is_empty());
     let silent = silent.count();
     let late = asks() == Some(true) && silent <= MOST_LOST;
     let reply = turns.get(number + if late { silent } else { 0 });
-    let read = reply.and_then(|own| own.read);
-    let next = turns.get(number + 1).map(|own| own.left);
+    let read = reply.and_then(|turn| turn.read);
+    let next = turns.get(number + 1).map(|turn| turn.left);
     read.or(next).unwrap_or_default().max(turn.left)
 }
 
@@ -248,11 +249,12 @@ fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
     }
     let mut all: Vec<Timed<Piece>> = Vec::new();
     let mut places = Vec::new();
-    for own in pieces(&octets, &ends) {
-        let place = ends.partition_point(|end| *end <= own.start);
+    for range in pieces(&octets, &ends) {
+        let place = ends.partition_point(|end| *end <= range.start);
         let turn = &turns[place];
-        let mut piece = Piece::of(&octets[own]);
-        let parted = telegram(&wide(&turn.octets)).is_some_and(|own| own.1 < turn.octets.len());
+        let mut piece = Piece::of(&octets[range]);
+        let first = telegram(&wide(&turn.octets));
+        let parted = first.is_some_and(|(_, length)| length < turn.octets.len());
         piece.begun = parted && piece.damaged;
         let latest = turn.read.unwrap_or(turn.left);
         match all.last_mut() {
@@ -275,7 +277,7 @@ fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
 
 /// Octets as they come without a line error.
 fn wide(octets: &[u8]) -> Vec<u16> {
-    octets.iter().map(|own| u16::from(*own)).collect()
+    octets.iter().map(|octet| u16::from(*octet)).collect()
 }
 
 #[cfg(test)]

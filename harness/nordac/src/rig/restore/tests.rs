@@ -49,7 +49,7 @@ impl Desk {
         first
             .parameters
             .push((control, Index::default(), interface));
-        let others = others.iter().map(|own| SlaveSetup::new(*own));
+        let others = others.iter().map(|address| SlaveSetup::new(*address));
         let setup = Setup {
             rate: RATE,
             slaves: std::iter::once(first).chain(others).collect(),
@@ -58,14 +58,14 @@ impl Desk {
         let slaves: Vec<_> = setup
             .slaves
             .iter()
-            .map(|own| RigSlave {
-                address: own.address,
+            .map(|setup| RigSlave {
+                address: setup.address,
                 ppo: Some(PpoType::One),
             })
             .collect();
-        let gated: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
+        let gated: Vec<GuardedSlave> = slaves.iter().copied().map(Into::into).collect();
         let can = Bench::CAPABILITIES.iter();
-        let can = can.filter(|own| !NOT_ON_PORT.contains(own)).copied();
+        let can = can.copied().filter(|can| !NOT_ON_PORT.contains(can));
         let can = (can.collect(), false);
         Self {
             line: guarded(Bench::new(&setup), limits, &gated, false),
@@ -76,12 +76,12 @@ impl Desk {
 
     /// Plays a scenario, takes the slaves to their safe state and puts them back. Returns what is left to say.
     fn play(&mut self, source: &Source) -> (Outcome, Vec<String>) {
-        let own = Arc::new(Own::read(source).expect("a scenario"));
-        if let Some(skip) = self.player.not_begun(&own) {
+        let scenario = Arc::new(Own::read(source).expect("a scenario"));
+        if let Some(skip) = self.player.not_begun(&scenario) {
             return (Outcome::skipped(skip), Vec::new());
         }
         self.line.reset_after_denial();
-        let (outcome, _) = self.player.attempt(&own, &mut self.line);
+        let (outcome, _) = self.player.attempt(&scenario, &mut self.line);
         self.line.reset_after_denial();
         let safe = safe_state(
             &mut self.line,
@@ -101,11 +101,11 @@ impl Desk {
     /// Where the slave is, and what its parameters hold.
     fn held(&self) -> (u8, Vec<(u16, u8, Option<i64>)>) {
         let inverter = self.line.inner().drive(8).expect("a drive").inverter();
-        let all = PARAMETERS.iter().filter(|own| !own.has(Flag::ReadOnly));
-        let all = all.flat_map(|own| {
+        let all = PARAMETERS.iter().filter(|row| !row.has(Flag::ReadOnly));
+        let all = all.flat_map(|parameter| {
             (0..4).map(move |set| {
                 let index = Index { element: 0, set };
-                (own.number, set, inverter.parameter(own, index))
+                (parameter.number, set, inverter.parameter(parameter, index))
             })
         });
         (inverter.settings().address, all.collect())
@@ -135,8 +135,8 @@ fn a_slave_that_leaves_meanwhile_is_put_back() {
     for after in (0..24).step_by(3) {
         let mut desk = Desk::new(0, &[], Limits::unlimited());
         let before = desk.held();
-        let own = Arc::new(Own::read(&source(LOCAL)).expect("a scenario"));
-        let (outcome, _) = desk.player.attempt(&own, &mut desk.line);
+        let scenario = Arc::new(Own::read(&source(LOCAL)).expect("a scenario"));
+        let (outcome, _) = desk.player.attempt(&scenario, &mut desk.line);
         assert_eq!(outcome.verdict, Verdict::Passed);
         let at = desk.line.now() + Span::from_millis(after);
         for (at, fault) in [
@@ -252,17 +252,18 @@ fn what_does_not_end_has_foretold_what_it_changes() {
         let text = format!(
             "title T\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 PKW={task}\nwait 5ms\n"
         );
-        let own = Own::read(&Source {
+        let scenario = Own::read(&Source {
             name: "t.scn".to_owned(),
             text: text.into(),
         });
-        let own = Arc::new(own.expect("a scenario"));
+        let scenario = Arc::new(scenario.expect("a scenario"));
         let broken_off = |after| {
             let mut desk = Desk::new(2, &[], Limits::unlimited());
             let mut sink = Panics(after);
             let mut recording = Recording::new(&mut desk.line, &mut sink);
             let player = &mut desk.player;
-            let played = catch_unwind(AssertUnwindSafe(|| player.attempt(&own, &mut recording)));
+            let play = AssertUnwindSafe(|| player.attempt(&scenario, &mut recording));
+            let played = catch_unwind(play);
             let whole = played.is_ok();
             (desk, whole, sink.0)
         };
@@ -276,8 +277,8 @@ fn what_does_not_end_has_foretold_what_it_changes() {
             let drive = line.drive(8).expect("a drive");
             drive.inverter().state().output_on()
         };
-        let own = Pieces::Octets(last_words(&desk.slaves).concat());
-        let pieces = [Some(own), desk.player.left.stops()].into_iter().flatten();
+        let last = Pieces::Octets(last_words(&desk.slaves).concat());
+        let pieces = [Some(last), desk.player.left.stops()].into_iter().flatten();
         // Past the gate, as a watchdog sends them.
         let line = desk.line.inner_mut();
         let pass = |line: &mut Bench, span| {
@@ -298,7 +299,7 @@ fn what_does_not_end_has_foretold_what_it_changes() {
         }
         drop(talk);
         assert!(on(line), "{task}");
-        for telegram in pieces.flat_map(|own| telegrams(&own)) {
+        for telegram in pieces.flat_map(|pieces| telegrams(&pieces)) {
             line.send_octets(0, &telegram);
             pass(line, PATIENCE);
         }

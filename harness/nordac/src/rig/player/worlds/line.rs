@@ -28,7 +28,7 @@ const IDLE: Span = Span::from_millis(1);
 
 /// Parameters that only the slave knows: warnings, hours, version and temperature, and behind them the fault memory, of which only the last
 /// fault is read (5.7).
-const OWN: [u16; 10] = [1807, 1808, 1812, 1825, 1801, 1802, 1803, 1804, 1805, 1806];
+const UNCOMPARED: [u16; 10] = [1807, 1808, 1812, 1825, 1801, 1802, 1803, 1804, 1805, 1806];
 
 /// How many of them are the fault memory.
 const FAULT_MEMORY: usize = 6;
@@ -89,9 +89,9 @@ impl Inputs {
             Service::DataExchange | Service::RdInp
         );
         let mut ppo = PpoType::ALL.into_iter().filter(|_| carries);
-        let ppo = ppo.find(|own| own.octets() == pdu.data().len())?;
+        let ppo = ppo.find(|ppo| ppo.octets() == pdu.data().len())?;
         let mut rest = Image::decode(ppo, pdu.data())?;
-        let [hiw, pzd4] = [rest.words[1], rest.words[3]].map(|own| i32::from(own.cast_signed()));
+        let [hiw, pzd4] = [rest.words[1], rest.words[3]].map(|word| i32::from(word.cast_signed()));
         let numbers = [hiw, pzd4, rest.pkw.pwe.cast_signed()];
         (rest.words[1], rest.words[3], rest.pkw.pwe) = (0, 0, 0);
         Some(Self {
@@ -112,8 +112,8 @@ impl Piece {
     }
 
     pub(super) fn of(octets: &[u16]) -> Self {
-        let telegram = telegram(octets).filter(|own| own.1 == octets.len());
-        let pdu = telegram.as_ref().and_then(|own| own.0.pdu());
+        let telegram = telegram(octets).filter(|telegram| telegram.1 == octets.len());
+        let pdu = telegram.as_ref().and_then(|telegram| telegram.0.pdu());
         Self {
             damaged: telegram.is_none(),
             octets: octets.to_vec(),
@@ -124,7 +124,7 @@ impl Piece {
 
     /// Whether what came are the same inputs, but for what moves.
     fn is_near(&self, came: &Self) -> bool {
-        let (Some(own), Some(came)) = (self.inputs, came.inputs) else {
+        let (Some(said), Some(came)) = (self.inputs, came.inputs) else {
             return false;
         };
         // The bits that compare the frequency move with it.
@@ -133,10 +133,10 @@ impl Piece {
             rest.words[0] |= moves;
             rest
         };
-        let mut numbers = own.numbers.iter().zip(came.numbers).zip(self.bands);
-        own.head == came.head
-            && alike(own.rest) == alike(came.rest)
-            && numbers.all(|((own, came), band)| own.abs_diff(came) <= band)
+        let mut numbers = said.numbers.iter().zip(came.numbers).zip(self.bands);
+        said.head == came.head
+            && alike(said.rest) == alike(came.rest)
+            && numbers.all(|((said, came), band)| said.abs_diff(came) <= band)
     }
 }
 
@@ -145,7 +145,7 @@ impl Piece {
 pub(super) struct Line<const SCAN: u64> {
     slaves: Vec<Deviant>,
     /// The parameters whose values are not compared.
-    own: &'static [u16],
+    uncompared: &'static [u16],
     /// Whether the slave was without a fault, so that a present one has come since.
     worked: bool,
     /// Whether a fault has come in this conversation: what is kept of it is compared behind its acknowledgement too.
@@ -159,13 +159,14 @@ pub(super) struct Line<const SCAN: u64> {
 
 impl<const SCAN: u64> Line<SCAN> {
     pub(super) fn new(slaves: &[SlaveSetup]) -> Self {
-        let remembers = slaves.iter().any(|own| !own.history.faults.is_empty());
-        let slaves = slaves.iter().map(|own| own.drive(HEARD_AT, Instant::START));
+        let remembers = slaves.iter().any(|slave| !slave.history.faults.is_empty());
+        let slaves = slaves.iter();
+        let slaves = slaves.map(|slave| slave.drive(HEARD_AT, Instant::START));
         let mut line = Self {
             slaves: slaves.collect(),
-            own: match remembers {
-                true => &OWN,
-                false => &OWN[..OWN.len() - FAULT_MEMORY],
+            uncompared: match remembers {
+                true => &UNCOMPARED,
+                false => &UNCOMPARED[..UNCOMPARED.len() - FAULT_MEMORY],
             },
             worked: false,
             failed: false,
@@ -203,9 +204,9 @@ impl<const SCAN: u64> Line<SCAN> {
                 slave.begin(self.now, &mut sent);
                 self.free += octet * sent.len() as u64;
                 slave.sent(self.free);
-                let reply: Vec<_> = sent.drain(..).map(|own| own.byte.into()).collect();
-                for own in pieces(&reply, &[]) {
-                    let mut piece = Piece::of(&reply[own]);
+                let reply: Vec<_> = sent.drain(..).map(|octet| octet.byte.into()).collect();
+                for range in pieces(&reply, &[]) {
+                    let mut piece = Piece::of(&reply[range]);
                     let inverter = self.slaves[place].drive().inverter();
                     piece.bands = self.bands(inverter, stood, piece.inputs.as_ref());
                     self.said.push_back(piece);
@@ -224,7 +225,7 @@ impl<const SCAN: u64> Line<SCAN> {
             return [0; 3];
         };
         let step = inverter.moves_within(Self::SCAN);
-        let [hiw, pzd4, value] = step.map(|own| u32::from(own) + 1);
+        let [hiw, pzd4, value] = step.map(|step| u32::from(step) + 1);
         let exact = |stood| [0, stood, wanted(inverter)].contains(&numbers[0]);
         let stands = stood.is_some_and(exact);
         let (number, element) = (rest.pkw.number(), rest.pkw.ind >> 8);
@@ -232,7 +233,7 @@ impl<const SCAN: u64> Line<SCAN> {
         let past = PAST_FAULTS.contains(&number) && MOVED.contains(&element);
         let moved = past && numbers[2] != 0 || !stands && (number, element) == FREQUENCY;
         let pwe = match matches!(rest.pkw.ak(), 1 | 4) {
-            true if self.own.contains(&number) && !follows => u32::MAX,
+            true if self.uncompared.contains(&number) && !follows => u32::MAX,
             true if moved => value,
             _ => 0,
         };
@@ -256,9 +257,9 @@ impl<const SCAN: u64> RightDrive for Line<SCAN> {
 
     fn due(&self) -> Option<Instant> {
         let slaves = self.slaves.iter();
-        let due = slaves.flat_map(|own| {
-            let moves = own.drive().inverter().moves_until();
-            own.next_action().into_iter().chain(moves)
+        let due = slaves.flat_map(|slave| {
+            let moves = slave.drive().inverter().moves_until();
+            slave.next_action().into_iter().chain(moves)
         });
         // All times are whole scans, so that those of two worlds can be the same.
         let due = due.min()?.since(Instant::START + SWITCHED_ON).units();
@@ -268,12 +269,13 @@ impl<const SCAN: u64> RightDrive for Line<SCAN> {
 
     fn rests(&self) -> bool {
         let mut slaves = self.slaves.iter();
-        slaves.all(|own| own.drive().inverter().moves_until().is_none())
+        slaves.all(|slave| slave.drive().inverter().moves_until().is_none())
     }
 
     fn advance(&mut self, to: Instant) {
         self.now = to + SWITCHED_ON;
-        self.slaves.iter_mut().for_each(|own| own.advance(self.now));
+        let slaves = self.slaves.iter_mut();
+        slaves.for_each(|slave| slave.advance(self.now));
     }
 
     fn hear(&mut self, _: Instant, piece: &Piece) {
@@ -319,13 +321,13 @@ impl<const SCAN: u64> RightDrive for Line<SCAN> {
 
 /// Octets without their line errors.
 pub(super) fn narrow(octets: &[u16]) -> Vec<u8> {
-    octets.iter().map(|own| *own as u8).collect()
+    octets.iter().map(|octet| *octet as u8).collect()
 }
 
 /// The telegram that begins here, without a line error, and how many octets it has.
 pub(super) fn telegram(octets: &[u16]) -> Option<(Telegram, usize)> {
     let octets = octets.iter().take(MAX_TELEGRAM);
-    let good = octets.map_while(|own| u8::try_from(*own).ok());
+    let good = octets.map_while(|octet| u8::try_from(*octet).ok());
     match Telegram::decode(&good.collect::<Vec<_>>()) {
         Decoded::Value { value, used } => Some((value, used)),
         _ => None,
@@ -334,12 +336,12 @@ pub(super) fn telegram(octets: &[u16]) -> Option<(Telegram, usize)> {
 
 /// How many octets the telegram has that begins here.
 fn length(octets: &[u16]) -> Option<usize> {
-    telegram(octets).map(|own| own.1)
+    telegram(octets).map(|telegram| telegram.1)
 }
 
 /// Whether octets are telegrams and nothing else.
 fn is_whole(octets: &[u16]) -> bool {
-    octets.is_empty() || length(octets).is_some_and(|own| is_whole(&octets[own..]))
+    octets.is_empty() || length(octets).is_some_and(|length| is_whole(&octets[length..]))
 }
 
 /// The places of telegrams in octets, and of what is none: that goes up to one of the ends, or to telegrams that have a checksum or follow the
@@ -348,15 +350,15 @@ pub(super) fn pieces(octets: &[u16], ends: &[usize]) -> Vec<Range<usize>> {
     let mut all = Vec::new();
     let mut from = 0;
     while from < octets.len() {
-        let end = ends.iter().copied().find(|own| *own > from);
+        let end = ends.iter().copied().find(|end| *end > from);
         let end = end.unwrap_or(octets.len());
-        let begins = |own: &usize| {
-            let rest = &octets[*own..end];
-            let ended = octets[*own - 1] == u16::from(ED);
-            length(rest).is_some_and(|own| ended || own >= SHORTEST) && is_whole(rest)
+        let begins = |place: &usize| {
+            let rest = &octets[*place..end];
+            let ended = octets[*place - 1] == u16::from(ED);
+            length(rest).is_some_and(|length| ended || length >= SHORTEST) && is_whole(rest)
         };
         let to = match length(&octets[from..]) {
-            Some(own) => from + own,
+            Some(length) => from + length,
             None => (from + 1..end).find(begins).unwrap_or(end),
         };
         all.push(from..to);

@@ -48,13 +48,13 @@ fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
         name: "x".to_owned(),
         text: text.into(),
     };
-    let own = Own::read(&source).expect("a scenario");
+    let scenario = Own::read(&source).expect("a scenario");
     let limits = Limits::unlimited();
     let patience = Span::from_millis(5);
     let able = (Vec::new(), false);
     let mut player = Player::of(vec![slave.slave], BusRate::K500, patience, limits, able);
     player.known = Some(vec![slave.clone()]);
-    player.rehearse(&own, &limits, Other::default()).turns
+    player.rehearse(&scenario, &limits, Other::default()).turns
 }
 
 /// Whether right slaves send this over a line that loses at most `most_lost` telegrams.
@@ -71,7 +71,7 @@ fn replies(line: &mut Line<LONG>, octets: &[u8], at: Instant) -> Vec<u16> {
     line.advance(at);
     line.hear(at, &Piece::of(&wide(octets)));
     let said = std::iter::from_fn(|| line.say());
-    said.flat_map(|own| own.octets).collect()
+    said.flat_map(|piece| piece.octets).collect()
 }
 
 /// The main actual value in the reply to an exchange by PPO1.
@@ -101,17 +101,17 @@ fn stands_still(slave: &Known, text: &'static str) {
             let pause = Span::from_millis(millis);
             // The telegram had left long before it reached the slave.
             let mut early = right.clone();
-            let before = place.checked_sub(1).and_then(|own| right[own].read);
+            let before = place.checked_sub(1).and_then(|place| right[place].read);
             early[place].left = (right[place].left - pause).max(before.unwrap_or_default());
             assert_eq!(judged(&early), Ok(()), "{place} {millis}");
             // The reply was read long behind it was there.
             let mut late = right.clone();
-            late[place].read = late[place].read.map(|own| own + pause);
-            for own in &mut late[place + 1..] {
-                own.left += pause;
-                own.read = own.read.map(|own| own + pause);
+            late[place].read = late[place].read.map(|read| read + pause);
+            for turn in &mut late[place + 1..] {
+                turn.left += pause;
+                turn.read = turn.read.map(|read| read + pause);
             }
-            let moves = |own: &Turn| actual(&own.came).is_some_and(|own| own != 0);
+            let moves = |turn: &Turn| actual(&turn.came).is_some_and(|hertz| hertz != 0);
             // What moves has gone on.
             let rests = place + 1 >= right.len() || !moves(&right[place + 1]);
             assert!(
@@ -201,7 +201,7 @@ fn a_line_that_loses_something_accuses_no_slave() {
     let right = turns(&all[0]);
     let lossy = |turns: &[Turn]| sent_by(&all, MOST_LOST, turns);
     assert_eq!(lossy(&right), Ok(Vec::new()));
-    let played = |own: &&usize| right[**own].step.is_some() && !right[**own].came.is_empty();
+    let played = |place: &&usize| right[**place].step.is_some() && !right[**place].came.is_empty();
     let places: Vec<_> = (0..right.len()).collect();
     for place in places.iter().filter(played).copied() {
         let mut lost = right.clone();
@@ -218,20 +218,20 @@ fn a_line_that_loses_something_accuses_no_slave() {
         if let Some(next) = slipped.get_mut(place + 1) {
             next.came.splice(0..0, came);
         }
-        for (way, own) in [lost, cut, changed, slipped].iter().enumerate() {
+        for (way, turns) in [lost, cut, changed, slipped].iter().enumerate() {
             // The place is that of the next telegram where both replies are the same; what has slipped whole was late.
-            let found = lossy(own);
+            let found = lossy(turns);
             let least = usize::from(way < 3);
             let one = found
                 .as_ref()
-                .is_ok_and(|own| (least..=1).contains(&own.len()));
+                .is_ok_and(|lost| (least..=1).contains(&lost.len()));
             assert!(one, "{place}, {way}: {found:?}");
         }
     }
     // Too many are none of the line's.
     let mut silent = right.clone();
-    for own in silent.iter_mut().filter(|own| own.step.is_some()) {
-        own.came.clear();
+    for turn in silent.iter_mut().filter(|turn| turn.step.is_some()) {
+        turn.came.clear();
     }
     assert!(lossy(&silent).is_err());
     assert!(lossy(&turns(&known(&[(1202, 80)]))).is_err());
@@ -242,7 +242,7 @@ fn a_line_that_loses_something_accuses_no_slave() {
 fn a_line_that_loses_a_request_accuses_no_slave() {
     let all = [known(&[])];
     let right = turns(&all[0]);
-    let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
+    let played = |place: &usize| right[*place].step.is_some() && !right[*place].came.is_empty();
     for place in (0..right.len()).filter(played) {
         let mut line = Line::new(&[all[0].model(Default::default())]);
         let mut lost = right.clone();
@@ -265,7 +265,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
     let pause = Span::from_millis(700);
     let all = [known(&[])];
     let right = turns(&all[0]);
-    let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
+    let played = |place: &usize| right[*place].step.is_some() && !right[*place].came.is_empty();
     for place in (0..right.len() - 1).filter(played) {
         let mut line = Line::new(&[all[0].model(Default::default())]);
         let mut late = right.clone();
@@ -275,7 +275,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
         for (number, turn) in late.iter_mut().enumerate() {
             let mut came = Vec::new();
             if number > place {
-                turn.read = turn.read.map(|own| own + pause);
+                turn.read = turn.read.map(|read| read + pause);
             }
             if number > place + 1 {
                 turn.left += pause;
@@ -298,8 +298,9 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
 #[test]
 fn a_line_adds_nothing() {
     let kinds = |octets: &[u16]| -> Vec<_> {
-        let own = pieces(octets, &[]).into_iter();
-        own.map(|own| Piece::of(&octets[own]).damaged).collect()
+        let pieces = pieces(octets, &[]).into_iter();
+        let pieces = pieces.map(|range| Piece::of(&octets[range]));
+        pieces.map(|piece| piece.damaged).collect()
     };
     assert_eq!(kinds(&[0xE5, 0x10]), [false, true]);
     assert_eq!(kinds(&[0x10]), [true]);
@@ -312,10 +313,10 @@ fn slaves_of_the_same_state_do_the_same() {
         exchange 8 STW=047F HSW=12.5%\nexchange 8 STW=047B HSW=25%\nexchange 8 STW=007F\nread 8 1202\nwrite 8 1202 = 5 s\n";
     let all = turns_of(&known(&[]), text);
     // What makes the slave exchange is not played again.
-    let start = all.iter().find_map(|own| own.step);
+    let start = all.iter().find_map(|turn| turn.step);
     let rest = all
         .iter()
-        .take_while(|own| own.step.is_none() || own.step == start);
+        .take_while(|turn| turn.step.is_none() || turn.step == start);
     let rest = rest.count();
     let played = &all[rest..];
     let mut begun = Line::<LONG>::new(&[known(&[]).model(Default::default())]);
@@ -349,7 +350,7 @@ fn slaves_of_the_same_state_do_the_same() {
             .clone();
         for (place, number) in (0..).zip(inputs.clone().chain(inputs.clone().rev())) {
             let then = now + Span::from_millis(20 * place);
-            let both = [&mut line, &mut other].map(|own| play(own, then, number));
+            let both = [&mut line, &mut other].map(|line| play(line, then, number));
             assert_eq!(both[0], both[1], "{history} {number}");
         }
         alike += 1;
