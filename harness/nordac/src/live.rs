@@ -103,15 +103,17 @@ pub(super) fn at_port(run: &TelegramRun, slaves: &[u8], reader: &mut Reader) -> 
     let last = run.octets.last();
     let at = last.map_or(String::new(), |octet| octet.at.to_string());
     let whole = run.octets.iter().all(|octet| octet.error.is_none());
-    arrow(run, (slaves, slaves.len() + 1), place, (whole, at), reader)
+    arrow(run, slaves, slaves.len() + 1, place, whole, at, reader)
 }
 
 /// A telegram from the column of its station to that of its receiver, or to all; slaves have the columns behind the first.
 fn arrow(
     run: &TelegramRun,
-    (slaves, columns): (&[u8], usize),
+    slaves: &[u8],
+    columns: usize,
     place: usize,
-    (whole, at): (bool, String),
+    whole: bool,
+    at: String,
     reader: &mut Reader,
 ) -> LiveRow {
     let Some(said) = run.said() else {
@@ -235,8 +237,8 @@ impl SegmentServer {
             from: slave,
             octets: run.octets.clone(),
         };
-        let line = (&slaves[..], self.columns());
-        arrow(&run, line, place, (whole, at), &mut recorder.reader)
+        let (columns, reader) = (self.columns(), &mut recorder.reader);
+        arrow(&run, &slaves, columns, place, whole, at, reader)
     }
 
     fn station(&self, address: u8) -> Vec<String> {

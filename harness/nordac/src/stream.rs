@@ -116,7 +116,8 @@ impl SegmentLink {
         wire: Wire,
         rate: BusRate,
         slaves: Vec<u8>,
-        (patience, echo): (Span, bool),
+        patience: Span,
+        echo: bool,
         interrupt: Arc<AtomicBool>,
     ) -> Self {
         let accounting = RequestAndReply {

@@ -11,7 +11,6 @@ use std::fmt;
 /// Why a call to a slave came to nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Error {
-    /// No reply came.
     #[error(
         "slave {slave} does not answer {service}: check its address (1624), the bit rate, its power, A and B of the line, and the termination"
     )]
@@ -20,17 +19,14 @@ pub(crate) enum Error {
         /// What was asked for: a service.
         service: &'static str,
     },
-    /// Another device answers at this address.
     #[error(
         "the station at address {slave} has the ident number {ident:04X}, and a NORDAC vector has {IDENT:04X}"
     )]
     OtherDevice { slave: u8, ident: u16 },
-    /// The slave belongs to another master.
     #[error(
         "slave {slave} exchanges data with master {master}: take that master off the line first"
     )]
     Taken { slave: u8, master: u8 },
-    /// The slave does not get into the exchange.
     #[error("slave {slave} does not start{}", why_not_started(.diagnosis.as_ref(), *.ppo))]
     NotStarted {
         slave: u8,
@@ -39,7 +35,6 @@ pub(crate) enum Error {
         /// Its last diagnosis.
         diagnosis: Option<Diagnosis>,
     },
-    /// The slave has another configuration than every PPO type.
     #[error(
         "slave {slave} replies the configuration {}, which no PPO type has: F3 F1, F3 F5, F1 or F5 expected",
         hex(.configuration)
@@ -49,7 +44,6 @@ pub(crate) enum Error {
         /// What Get_Cfg replied.
         configuration: Vec<u8>,
     },
-    /// The slave was exchanging data and does not any more.
     #[error(
         "slave {slave} has left the exchange{}: start it again",
         left(.not_activated.as_ref())
@@ -61,17 +55,14 @@ pub(crate) enum Error {
     },
     #[error("slave {0} was not started")]
     NotRunning(u8),
-    /// The PPO type has no parameter channel.
     #[error(
         "slave {slave} is set to {ppo}, which has no parameter channel: PPO1 or PPO2 (1622) carries parameters"
     )]
     NoChannel { slave: u8, ppo: PpoType },
-    /// The parameter channel carries another answer than the one to the task.
     #[error(
         "slave {slave}: the parameter channel did not answer the task for {parameter} within 40 exchanges"
     )]
     NoAnswer { slave: u8, parameter: ParameterRef },
-    /// The slave answers with an error number (NORDAC 3.4.1).
     #[error("slave {slave} refuses to {what} parameter {parameter} ({}): {error}{}", .parameter.parameter.name, hint(*.error, .parameter.parameter))]
     Refused {
         slave: u8,
@@ -80,7 +71,6 @@ pub(crate) enum Error {
         parameter: ParameterRef,
         error: PkwError,
     },
-    /// The answer has another form than the manual prints for the task.
     #[error(
         "slave {slave} answers the task for parameter {parameter} with {answer}, and the manual prints another answer (3.4.1)"
     )]
@@ -90,7 +80,6 @@ pub(crate) enum Error {
         /// The answer, as the manual writes it.
         answer: String,
     },
-    /// A parameter reads differently from what was written.
     #[error("slave {slave}, parameter {parameter} ({}): wrote {}, reads {}", .parameter.parameter.name, .parameter.parameter.show(.parameter.index.element, *.wrote), .parameter.parameter.show(.parameter.index.element, *.reads))]
     Differs {
         slave: u8,
@@ -113,12 +102,10 @@ pub(crate) enum Error {
         /// Its number (5.7), where the parameter channel tells it.
         fault: Option<i64>,
     },
-    /// A slave that the bus does not control.
     #[error(
         "slave {slave} is under local control, so it ignores control words: `drivebench write {slave} Interface = 2` gives control to the bus (1621)"
     )]
     Local { slave: u8 },
-    /// A frequency cannot be a setpoint.
     #[error(
         "slave {slave}: a setpoint of {hertz} Hz is out of range: the maximum frequency (1205) is {maximum}, and HSW carries -200 to 200 %"
     )]
@@ -127,14 +114,12 @@ pub(crate) enum Error {
         hertz: String,
         maximum: String,
     },
-    /// Another master uses the line.
     #[error(
         "station {station} sends as a master on this line: the bench must be the only master, so take the other one off first"
     )]
     OtherMaster { station: u8 },
     #[error("the line did not take a telegram")]
     NotSent,
-    /// The line carries nothing more.
     #[error("{0}")]
     Link(Trouble),
 }

@@ -35,7 +35,7 @@ impl Sender {
         let mut all = Vec::with_capacity(runs.len());
         for (place, run) in runs.iter().enumerate() {
             let before = place.checked_sub(1).and_then(|place| runs.get(place));
-            let sender = Self::of(run, (before, runs.get(place + 1)), octet, &masters);
+            let sender = Self::of(run, before, runs.get(place + 1), octet, &masters);
             let confirms = is_confirmation(run);
             strays |= confirms && sender != Self::Known;
             all.push(match sender {
@@ -48,7 +48,8 @@ impl Sender {
 
     fn of(
         run: &TelegramRun,
-        (before, behind): (Option<&TelegramRun>, Option<&TelegramRun>),
+        before: Option<&TelegramRun>,
+        behind: Option<&TelegramRun>,
         octet: Span,
         masters: &BTreeSet<u8>,
     ) -> Self {

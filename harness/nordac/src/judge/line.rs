@@ -199,9 +199,12 @@ impl Judge {
 
     fn breach(
         &mut self,
-        (telegram, slave): (usize, u8),
-        (what, section): (Symptom, &'static str),
-        (part, about): (&str, String),
+        telegram: usize,
+        slave: u8,
+        what: Symptom,
+        section: &'static str,
+        part: &str,
+        about: String,
     ) {
         let standing = self.standing(slave);
         if !standing.is_judged() {
@@ -395,7 +398,7 @@ impl Judge {
                 return;
             }
             let about = "it sends again without a request in between".to_owned();
-            return self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
+            return self.breach(number, from, Unasked, "EN 1", NO_REQUEST, about);
         };
         let address = asked.pdu.as_ref().map_or(from, Pdu::da);
         let is_judged = self.standing(address).is_judged();
@@ -420,7 +423,7 @@ impl Judge {
                     "it replies to telegram {}, which is no request",
                     asked.number
                 );
-                self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
+                self.breach(number, from, Unasked, "EN 1", NO_REQUEST, about);
             }
             // What the capture begins in the middle of was not heard; two telegrams in a row were, and hide the request.
             let hidden = !(asked.doubtful && asked.number == 1);
@@ -461,12 +464,12 @@ impl Judge {
         }
         if let Some((earlier, what)) = shown {
             let about = format!("{what} is not answered, and the slave goes on exchanging");
-            self.breach((earlier, address), (Missing, "EN 1"), (&what, about));
+            self.breach(earlier, address, Missing, "EN 1", &what, about);
         }
         if let Some((what, section, why)) = found {
             let place = ReplySubject::of(Some(&Telegram::Pdu(request))).part;
             let about = format!("{place}: {why}");
-            self.breach((number, from), (what, section), (&place, about));
+            self.breach(number, from, what, section, &place, about);
         }
     }
 

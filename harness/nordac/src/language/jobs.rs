@@ -60,7 +60,7 @@ pub(super) fn play(
     job: &PlannedJob,
 ) -> Result<(), Stop> {
     match job {
-        PlannedJob::Start { ppo, watchdog } => start(runner, span, slave, (*ppo, *watchdog)),
+        PlannedJob::Start { ppo, watchdog } => start(runner, span, slave, *ppo, *watchdog),
         PlannedJob::Exchange { send, expect } => {
             let known = known(runner, slave);
             known.sent.pkw = Pkw::default();
@@ -91,17 +91,24 @@ pub(super) fn play(
             }
         }
         PlannedJob::On => on(runner, span, slave),
-        PlannedJob::Off => reach(runner, span, slave, READY, RAMP, ("off", is_off)),
+        PlannedJob::Off => reach(runner, span, slave, READY, RAMP, "off", is_off),
         PlannedJob::QuickStop => {
-            let done = ("start-disabled", |zsw| is_off(zsw) && zsw & STATE == 0x40);
-            reach(runner, span, slave, QUICK_STOP, RAMP, done)
+            let done = |zsw| is_off(zsw) && zsw & STATE == 0x40;
+            reach(
+                runner,
+                span,
+                slave,
+                QUICK_STOP,
+                RAMP,
+                "start-disabled",
+                done,
+            )
         }
         PlannedJob::Acknowledge => {
-            let any = ("seen", |_| true);
-            reach(runner, span, slave, READY, PATIENCE, any)?;
-            let acknowledge = READY | stw::ACKNOWLEDGE;
-            let done = ("without a fault", |zsw| zsw & FAULT == 0);
-            reach(runner, span, slave, acknowledge, PATIENCE, done)
+            reach(runner, span, slave, READY, PATIENCE, "seen", |_| true)?;
+            let word = READY | stw::ACKNOWLEDGE;
+            let done = |zsw| zsw & FAULT == 0;
+            reach(runner, span, slave, word, PATIENCE, "without a fault", done)
         }
     }
 }
@@ -186,7 +193,9 @@ fn ask(
     runner: &mut Runner<'_, Nordac>,
     span: TextSpan,
     slave: u8,
-    (function, service, data): (Function, Service, &[u8]),
+    function: Function,
+    service: Service,
+    data: &[u8],
 ) -> Result<Telegram, Stop> {
     let known = known(runner, slave);
     known.sequence = known.sequence.next();
@@ -274,7 +283,8 @@ fn start(
     runner: &mut Runner<'_, Nordac>,
     span: TextSpan,
     slave: u8,
-    (ppo, watchdog): (PpoType, Option<[u8; 2]>),
+    ppo: PpoType,
+    watchdog: Option<[u8; 2]>,
 ) -> Result<(), Stop> {
     *known(runner, slave) = Known {
         ppo: Some(ppo),
@@ -292,7 +302,7 @@ fn start(
     ];
     diagnose(runner, span, slave)?;
     for (service, octets) in steps {
-        let reply = ask(runner, span, slave, (Function::SrdLow, service, octets))?;
+        let reply = ask(runner, span, slave, Function::SrdLow, service, octets)?;
         if reply != Telegram::Confirmation {
             let found = reply.encode();
             let name = service.name();
@@ -311,9 +321,9 @@ fn start(
 }
 
 fn diagnose(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<Diagnosis, Stop> {
-    let request = (Function::SrdLow, Service::SlaveDiag, &[][..]);
-    let reply = ask(runner, span, slave, request)?;
-    let octets = data(span, slave, reply, Service::SlaveDiag.name())?;
+    let service = Service::SlaveDiag;
+    let reply = ask(runner, span, slave, Function::SrdLow, service, &[])?;
+    let octets = data(span, slave, reply, service.name())?;
     Diagnosis::decode(&octets).ok_or_else(|| {
         let message = format!("slave {slave} sends a diagnosis of a wrong form: {octets}");
         Stop::failed(span, message)
@@ -325,9 +335,9 @@ fn exchange(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Resul
     let known = known(runner, slave);
     let ppo = known.ppo.unwrap_or_default();
     let octets = known.sent.encode(ppo);
-    let request = (Function::SrdHigh, Service::DataExchange, &*octets);
-    let reply = ask(runner, span, slave, request)?;
-    let octets = data(span, slave, reply, Service::DataExchange.name())?;
+    let service = Service::DataExchange;
+    let reply = ask(runner, span, slave, Function::SrdHigh, service, &octets)?;
+    let octets = data(span, slave, reply, service.name())?;
     Image::decode(ppo, &octets).ok_or_else(|| {
         let (found, wanted) = (octets.len(), ppo.octets());
         let message = format!(
@@ -345,7 +355,8 @@ fn reach(
     slave: u8,
     control: u16,
     patience: Span,
-    (wanted, done): (&str, impl Fn(u16) -> bool),
+    wanted: &str,
+    done: impl Fn(u16) -> bool,
 ) -> Result<(), Stop> {
     let known = known(runner, slave);
     known.sent.pkw = Pkw::default();
@@ -380,11 +391,11 @@ fn on(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<(), 
         return Err(Stop::failed(span, message));
     }
     if is_off(zsw) {
-        let ready = ("ready to start", |zsw| zsw & STATE == READY_TO_START);
-        reach(runner, span, slave, READY, PATIENCE, ready)?;
+        let done = |zsw| zsw & STATE == READY_TO_START;
+        reach(runner, span, slave, READY, PATIENCE, "ready to start", done)?;
     }
-    let enabled = ("enabled", |zsw| !is_off(zsw));
-    reach(runner, span, slave, ENABLED, PATIENCE, enabled)
+    let done = |zsw| !is_off(zsw);
+    reach(runner, span, slave, ENABLED, PATIENCE, "enabled", done)
 }
 
 impl PlannedParameter {

@@ -163,7 +163,7 @@ impl Reader {
             }
             Service::DataExchange => match self.image(slave, data) {
                 Some((ppo, image)) => {
-                    let words = words(ppo, &image, ("STW", "HSW"), control);
+                    let words = words(ppo, &image, "STW", "HSW", control);
                     let task = image.pkw.task();
                     let pkw = (task != Task::None).then(|| asks(image.pkw));
                     joined(words, pkw)
@@ -185,7 +185,7 @@ impl Reader {
             }
             Service::DataExchange | Service::RdInp => match self.image(pdu.sa(), data) {
                 Some((ppo, image)) => {
-                    let words = words(ppo, &image, ("ZSW", "HIW"), status);
+                    let words = words(ppo, &image, "ZSW", "HIW", status);
                     let pkw = (image.pkw != Pkw::default()).then(|| says(image.pkw));
                     joined(words, pkw)
                 }
@@ -211,12 +211,7 @@ fn joined(words: String, pkw: Option<String>) -> String {
 }
 
 /// The process words, and what the first says.
-fn words(
-    ppo: PpoType,
-    image: &Image,
-    (first, main): (&str, &str),
-    says: fn(u16) -> String,
-) -> String {
+fn words(ppo: PpoType, image: &Image, first: &str, main: &str, says: fn(u16) -> String) -> String {
     let word = image.first();
     let mut text = format!("{first} {word:04X} ({})", says(word));
     let percent = f64::from(image.main().cast_signed()) * 100.0 / 16384.0;

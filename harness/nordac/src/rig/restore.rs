@@ -109,14 +109,9 @@ impl Player {
         all.extend(moved.clone().map(|(slave, to)| {
             format!("slave {slave} may be at address {to} (1624): with `address = {to}` in the rig's file it is found there")
         }));
-        let same = self
-            .known()
-            .iter()
-            .map(|known| (known, known.slave.address));
-        let moved = moved.filter_map(|(slave, to)| {
-            let mut known = self.known().iter();
-            Some((known.find(|known| known.slave.address == *slave)?, *to))
-        });
+        let known = self.known().iter();
+        let same = known.map(|known| (known, known.slave.address));
+        let moved = moved.filter_map(|(slave, to)| Some((self.known_at(*slave)?, *to)));
         let elsewhere = same.chain(moved).filter_map(|(known, address)| {
             let ppo = known.slave.ppo.filter(|_| !may_switch(known, begun));
             let slave = RigSlave { address, ppo };
@@ -268,7 +263,7 @@ impl<'k, 'l> Back<'k, 'l> {
         if number == INTERFACE {
             // The terminals control it from then on, and it goes on holding this word.
             let ppo = self.slave.ppo.unwrap_or_default();
-            idle((self.slave.address, ppo), &mut self.talk)?;
+            idle(self.slave.address, ppo, &mut self.talk)?;
         }
         match self.task(writes, place, raw) {
             Err(TalkError::Exchange {
@@ -304,6 +299,6 @@ impl<'k, 'l> Back<'k, 'l> {
             ..Image::default()
         };
         let zsw = self.talk.exchange(slave, ppo, &off)?.words[0];
-        player.without_fault((slave, ppo), zsw, &mut self.talk)
+        player.without_fault(slave, ppo, zsw, &mut self.talk)
     }
 }

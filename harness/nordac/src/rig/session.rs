@@ -233,8 +233,8 @@ fn ends(
     let lock = locks.then(|| lock(rig, &place, wire.fd()));
     let locks = lock.transpose()?.into_iter().collect();
     let addresses = slaves(port).iter().map(|slave| slave.address).collect();
-    let how = (patience(port), port.echo);
-    let link = SegmentLink::new(wire, rate, addresses, how, options.interrupt.clone());
+    let (patience, interrupt) = (patience(port), options.interrupt.clone());
+    let link = SegmentLink::new(wire, rate, addresses, patience, port.echo, interrupt);
     Ok((Ends::Ports(Box::new(link)), locks))
 }
 

@@ -18,13 +18,10 @@ const TRIES: u8 = 3;
 /// Why a slave did not do as it was asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum TalkError {
-    /// The line carries nothing more.
     #[error("{0}")]
     Line(Trouble),
-    /// The adapter hears what the bench sends.
     #[error("the adapter gives back what the bench sends: set `echo = true` in [port.1]")]
     Echo,
-    /// It behaves in another way than the profile of the rig's file says.
     #[error(
         "slave {slave} does not have {property} = {says}, as the profile of the rig's file says: the profile is of another slave; qualify this one, or take `profile` out of the file"
     )]
@@ -33,10 +30,8 @@ pub(crate) enum TalkError {
         property: &'static str,
         says: String,
     },
-    /// It does not reply.
     #[error("slave {slave} does not reply to {service}")]
     NoReply { slave: u8, service: &'static str },
-    /// Its reply is none to this service.
     #[error("slave {slave} replies to {service} with {found}")]
     Unexpected {
         slave: u8,
@@ -44,17 +39,14 @@ pub(crate) enum TalkError {
         /// What it replies, in words.
         found: String,
     },
-    /// It does not get into the exchange.
     #[error("slave {slave}: {why}")]
     Start {
         slave: u8,
         /// Why not.
         why: StartError,
     },
-    /// An exchange failed.
     #[error("slave {slave}: {why}")]
     Exchange { slave: u8, why: ExchangeError },
-    /// It has a fault.
     #[error(
         "slave {slave} has a fault (ZSW {zsw:04X}): remove its cause and `drivebench acknowledge {slave}`; with `allow_motion` in [limits] and --allow-motion the bench acknowledges it before each scenario"
     )]

@@ -10,7 +10,6 @@ use harness_proto::unitek::master::{Outcome, Refused};
 /// Why a call to a drive came to nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Error {
-    /// No reply came. A drive sends no error reply, so nothing tells why.
     #[error(
         "drive {node} does not answer for register {register:02X} ({}): {}, no reply; check its identifiers, the bit rate and its power",
         name(*.register),
@@ -22,7 +21,6 @@ pub(crate) enum Error {
         /// How often it was asked.
         tries: u8,
     },
-    /// A register reads differently from what was written.
     #[error(
         "drive {node}, register {register:02X} ({}): wrote {}, reads {}",
         name(*.register), hex(*.wrote), hex(.reads.data)
@@ -33,7 +31,6 @@ pub(crate) enum Error {
         wrote: Data,
         reads: Reply,
     },
-    /// A drive is not ready, or its hardware enable is open.
     #[error(
         "drive {node} was not released: register {:02X} ({}) reads {}, 1 expected{}",
         .reads.register, name(.reads.register), hex(.reads.data), hint(.reads.register)
@@ -49,17 +46,14 @@ pub(crate) enum Error {
         says: String,
         shows: String,
     },
-    /// A time-out of the bus was provoked, and nothing clears it.
     #[error(
         "drive {node}: its BUS-TIMEOUT stays: neither 8E (FUN_ERRCANCEL) nor a lock and its release clears it (UNITEK dump)"
     )]
     TimeOutStays { node: u8 },
-    /// The request is impossible.
     #[error("{0}")]
     Refused(Refused),
     #[error("the bench has no drive {0}")]
     NoSuchDrive(u8),
-    /// The line carries nothing more.
     #[error("{0}")]
     Link(Trouble),
 }

@@ -34,12 +34,12 @@ impl Follower {
                 "register {:02X} ({}) comes with {bytes} bytes, and {wanted} are expected",
                 reply.register, register.name
             );
-            self.breach((number, reply.register), (Length, "App 2"), about);
+            self.breach(number, reply.register, Length, "App 2", about);
         } else if map && wide == Some(false) && reply.register == 0x8F {
             // 8F is never sent by event, so that its length is that of `map-reply` for good.
             if self.short_map.is_some_and(|short| short == long) {
                 let about = "register 8F comes with another length than before".to_owned();
-                self.breach((number, reply.register), (Length, "App 7"), about);
+                self.breach(number, reply.register, Length, "App 7", about);
             }
             self.short_map = Some(!long);
         }
@@ -59,7 +59,7 @@ impl Follower {
         {
             let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();
             let why = self.written_elsewhere(0x51);
-            self.differs((number, reply.register), (Value, "ex 2"), (about, why));
+            self.differs(number, reply.register, Value, "ex 2", about, why);
         }
         if is_live(reply.register) {
             return;
@@ -79,7 +79,7 @@ impl Follower {
                 reply.register, register.name
             );
             self.refused.remove(&reply.register);
-            self.breach((number, reply.register), (Value, "dump"), about);
+            self.breach(number, reply.register, Value, "dump", about);
         }
         let homes = self.homes == Homing::AskedFor && reply.register == 0x6E;
         if register.access == Access::FN || homes {
@@ -106,11 +106,7 @@ impl Follower {
                         .to_owned()
                 });
                 let why = self.written_elsewhere(reply.register).or(homes);
-                self.differs(
-                    (number, reply.register),
-                    (Value, register.origin),
-                    (about, why),
-                );
+                self.differs(number, reply.register, Value, register.origin, about, why);
             }
         }
         if reply.register == 0xDC && asked.held == held {

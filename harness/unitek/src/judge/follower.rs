@@ -280,8 +280,10 @@ impl Follower {
 
     pub(super) fn breach(
         &mut self,
-        (frame, register): (usize, u8),
-        (what, section): (FrameSymptom, &'static str),
+        frame: usize,
+        register: u8,
+        what: FrameSymptom,
+        section: &'static str,
         about: String,
     ) {
         if self.judged.breaches.len() < MOST_BREACHES {
@@ -299,12 +301,15 @@ impl Follower {
     /// The same where there may be another cause than a wrong drive: then it is in doubt.
     pub(super) fn differs(
         &mut self,
-        (frame, register): (usize, u8),
-        what: (FrameSymptom, &'static str),
-        (about, why): (String, Option<String>),
+        frame: usize,
+        register: u8,
+        what: FrameSymptom,
+        section: &'static str,
+        about: String,
+        why: Option<String>,
     ) {
         match why {
-            None => self.breach((frame, register), what, about),
+            None => self.breach(frame, register, what, section, about),
             Some(why) => self.judged.doubt(format!(
                 "frame {frame}, drive {}: {about}; {why}",
                 self.drive
@@ -506,7 +511,7 @@ impl Follower {
                 match running.owed {
                     0 => {
                         let about = running.not_there(register);
-                        self.breach((number, register), (Missing, "ex 9"), about);
+                        self.breach(number, register, Missing, "ex 9", about);
                     }
                     _ => self.owes(number, register),
                 }
@@ -536,7 +541,7 @@ impl Follower {
             Err(why) => {
                 self.judged.compared += 1;
                 let about = format!("{} is no reply: {why}", written(&frame.frame));
-                return self.breach((number, first), (Length, "4.5"), about);
+                return self.breach(number, first, Length, "4.5", about);
             }
         };
         self.judged.compared += 1;
@@ -556,7 +561,7 @@ impl Follower {
                 self.drive
             )
         });
-        self.differs((number, register), (Name, "3.1"), (about, why));
+        self.differs(number, register, Name, "3.1", about, why);
         self.may_use(0x69, frame.frame.id().number());
     }
 }

@@ -44,7 +44,7 @@ impl Follower {
         let mut other = self.restarted(at + silence);
         other.cycles.fill(Cycle::Unknown);
         self.supply
-            .has_gap(other, self.judged.breaches.len(), (number, at));
+            .has_gap(other, self.judged.breaches.len(), number, at);
     }
 
     /// The place of the request that a reply answers: one behind the last gap of the log, where there is one.
@@ -65,7 +65,7 @@ impl Follower {
         let excused = asked.excused && self.excused <= MOST;
         if asked.sure || asked.excused {
             let why = excused.then(|| IN_A_GAP.to_owned());
-            self.differs((asked.frame, register), (Missing, "5.2"), (about, why));
+            self.differs(asked.frame, register, Missing, "5.2", about, why);
         }
     }
 
@@ -76,7 +76,7 @@ impl Follower {
         {
             let about = running.not_there(register);
             let why = Some(IN_A_GAP.to_owned());
-            self.differs((number, register), (Missing, "ex 9"), (about, why));
+            self.differs(number, register, Missing, "ex 9", about, why);
         }
     }
 
@@ -86,7 +86,7 @@ impl Follower {
         {
             (running.owed, running.sure) = (0, false);
             let about = running.not_there(register);
-            self.breach((number, register), (Missing, "ex 9"), about);
+            self.breach(number, register, Missing, "ex 9", about);
         }
     }
 

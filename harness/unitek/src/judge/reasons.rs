@@ -59,7 +59,7 @@ impl Follower {
                 if !self.cycles[usize::from(register)].in_flight(frame.start, patience, !self.timed)
                 {
                     let why = self.asked_elsewhere(register, frame.start);
-                    self.differs((number, register), (Unasked, "5.2"), (unasked(frame), why));
+                    self.differs(number, register, Unasked, "5.2", unasked(frame), why);
                 }
                 None
             }
@@ -73,7 +73,7 @@ impl Follower {
             let about = format!(
                 "register {register:02X} ({name}) is asked for every {every}: {what} {gap} behind the one before"
             );
-            self.breach((number, register), (Time, "ex 9"), about);
+            self.breach(number, register, Time, "ex 9", about);
         }
         None
     }
@@ -94,7 +94,7 @@ impl Follower {
                 )
             });
             let why = self.asked_elsewhere(register, frame.start).or(guessed);
-            self.differs((number, register), (Unasked, "5.2"), (about, why));
+            self.differs(number, register, Unasked, "5.2", about, why);
         }
         self.unsolicited.insert(register, frame.start);
     }

@@ -61,12 +61,7 @@ impl Supply {
     }
 
     /// The same behind a gap of the log, which ends at `at`.
-    pub(super) fn has_gap(
-        &mut self,
-        other: Follower,
-        breaches: usize,
-        (ended, at): (usize, Instant),
-    ) {
+    pub(super) fn has_gap(&mut self, other: Follower, breaches: usize, ended: usize, at: Instant) {
         self.may_be(other, breaches, ended);
         (self.is_gap, self.has_gaps, self.sent) = (true, true, Some(at));
     }

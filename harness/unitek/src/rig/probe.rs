@@ -99,7 +99,8 @@ pub(super) fn settle(
 pub(super) fn settle_within(
     known: &mut Known,
     link: &mut Observed<'_>,
-    (patience, rate): (Span, BitRate),
+    patience: Span,
+    rate: BitRate,
     limits: &Limits,
     free: u16,
 ) -> Result<(), Error> {
@@ -281,7 +282,7 @@ impl Probe<'_, '_> {
         let mask = self.known.cell(MASK);
         self.write(SPEED, zero)?;
         self.write(MASK, Data::Long(status::SPEED))?;
-        let set_up = self.status_by((MODE, BOTH))?;
+        let set_up = self.status_by(MODE, BOTH)?;
         let (mut falls, mut rises) = (None, None);
         // An adapter may lose a frame.
         let rounds = match self.link.time_tolerance() {
@@ -289,8 +290,8 @@ impl Probe<'_, '_> {
             _ => TRIES,
         };
         for _ in 0..rounds {
-            falls = self.status_by((TORQUE, zero))?.or(falls);
-            rises = self.status_by((SPEED, zero))?.or(rises);
+            falls = self.status_by(TORQUE, zero)?.or(falls);
+            rises = self.status_by(SPEED, zero)?.or(rises);
             if falls.is_some() == rises.is_some() {
                 break;
             }
@@ -319,7 +320,7 @@ impl Probe<'_, '_> {
     }
 
     /// STATUS, if it is sent while a register is written. The write is not read back, so that no reply stands between.
-    fn status_by(&mut self, (register, data): (u8, Data)) -> Result<Option<Data>, Error> {
+    fn status_by(&mut self, register: u8, data: Data) -> Result<Option<Data>, Error> {
         let [low, high, ..] = data.bits().to_le_bytes();
         let sent = self.send(&[register, low, high])?;
         let heard = self.listen(sent + self.patience.max(SLACK))?;

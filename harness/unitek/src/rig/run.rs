@@ -45,10 +45,8 @@ impl PortPlayer for Player {
             port.map_or(BitRate::K500, rate),
             port.map_or(Span::ZERO, patience),
             limits(rig, allow_motion),
-            (
-                segment.capabilities,
-                port.is_none_or(Port::carries_remote_frames),
-            ),
+            segment.capabilities,
+            port.is_none_or(Port::carries_remote_frames),
         );
         match qualifies {
             true => {
@@ -116,8 +114,8 @@ impl PortPlayer for Player {
         if scenario.frames().any(stores) {
             self.note_stored();
         }
-        let changed = (self.written(), self.stored_levels());
-        set_back(session, self.read_so_far(), changed)
+        let (written, stored) = (self.written(), self.stored_levels());
+        set_back(session, self.read_so_far(), written, stored)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

@@ -106,7 +106,7 @@ impl HeldBefore {
     /// Sets back what was changed. Returns what is left to say.
     pub(crate) fn set_back(&self, session: &mut Session) -> Vec<String> {
         let stored = self.notes.stored().collect();
-        set_back(session, &self.drives, (&self.notes.written, &stored))
+        set_back(session, &self.drives, &self.notes.written, &stored)
     }
 }
 
@@ -115,7 +115,8 @@ impl HeldBefore {
 pub(super) fn set_back(
     session: &mut Session,
     drives: &[Known],
-    (written, stored): (&Written, &BTreeSet<(u16, u16)>),
+    written: &Written,
+    stored: &BTreeSet<(u16, u16)>,
 ) -> Vec<String> {
     let rig = session.rig().clone();
     // No motor is released behind an interlock that has tripped.

@@ -64,7 +64,7 @@ impl Player {
     /// What no right slave sends, where nothing that the line has lost or a stream has parted explains it.
     fn differs(&mut self, scenario: &Own, left: &Left) -> Option<Differs> {
         let turns = &left.turns;
-        let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
+        let sent = right_slaves_send(self.known(), self.rate, 0, turns, &self.beats);
         let differs = sent.err().filter(|differs| differs.open.is_none())?;
         self.lost(scenario, turns).is_none().then_some(differs)
     }
@@ -100,7 +100,7 @@ impl Player {
             let remark = format!("{why} (the computer or the adapter was late by {late})");
             Outcome::not_ready(verdict, Unready::NoAnswer, remark)
         };
-        let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
+        let sent = right_slaves_send(self.known(), self.rate, 0, turns, &self.beats);
         match sent {
             Err(Differs {
                 open: Some(why), ..
@@ -152,7 +152,7 @@ impl Player {
     /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
     /// there in the two attempts before is not lost by the line.
     fn lost(&mut self, scenario: &Own, turns: &[Turn]) -> Option<String> {
-        let sent = right_slaves_send(self.known(), (self.rate, MOST_LOST), turns, &self.beats);
+        let sent = right_slaves_send(self.known(), self.rate, MOST_LOST, turns, &self.beats);
         let lost = match sent {
             Ok(lost) => lost,
             Err(Differs { open, .. }) => {

@@ -195,6 +195,10 @@ impl Player {
     pub(super) fn known(&self) -> &[Known] {
         self.known.as_deref().unwrap_or_default()
     }
+    pub(super) fn known_at(&self, address: u8) -> Option<&Known> {
+        let mut known = self.known().iter();
+        known.find(|known| known.slave.address == address)
+    }
 
     /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
     pub(super) fn not_begun(&self, scenario: &Own) -> Option<Skip> {
@@ -237,7 +241,7 @@ impl Player {
             None => self.go(scenario, &mut link, None),
         };
         if let Some(begun) = begun {
-            self.note(begun, scenario, (&link, switches), &gone);
+            self.note(begun, scenario, &link, switches, &gone);
         }
         let left = Left {
             way: LinkTimes {
@@ -456,7 +460,7 @@ impl Player {
             let ppo = known.ppo();
             talk.restart(address);
             talk.start(address, ppo, None)?;
-            self.without_fault((address, ppo), zsw, &mut talk)?;
+            self.without_fault(address, ppo, zsw, &mut talk)?;
             settle::forget(known, &mut talk)?;
         }
         drop(talk);

@@ -259,7 +259,7 @@ impl SlaveNote {
         beats.beat();
         let sent = match other {
             Other::Right => {
-                right_slaves_send(&self.slaves, (rate, 0), &self.turns, beats).map(|_| ())
+                right_slaves_send(&self.slaves, rate, 0, &self.turns, beats).map(|_| ())
             }
             Other::WrongSlave(place, deviation) => {
                 let known = self.slaves.iter();
@@ -278,17 +278,18 @@ impl SlaveNote {
 
     /// What the attempt shows on models.
     fn shown_by(&self, other: Other, properties: &Assumed, held: &Values) -> AttemptShown {
-        let mut last = self.played_by((other, held), properties, None);
+        let mut last = self.played_by(other, held, properties, None);
         // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
         if last != self.shown && self.slaves.iter().any(|slave| slave.values.is_empty()) {
-            last = self.played_by((other, held), properties, Some(2));
+            last = self.played_by(other, held, properties, Some(2));
         }
         last
     }
 
     fn played_by(
         &self,
-        (other, held): (Other, &Values),
+        other: Other,
+        held: &Values,
         properties: &Assumed,
         interface: Option<i64>,
     ) -> AttemptShown {
@@ -403,7 +404,8 @@ impl Player {
         &mut self,
         begun: Self,
         scenario: &Arc<Own>,
-        (link, switches): (&Observed<'_>, bool),
+        link: &Observed<'_>,
+        switches: bool,
         gone: &AttemptCourse,
     ) {
         let exact = link.time_tolerance() == Span::ZERO;

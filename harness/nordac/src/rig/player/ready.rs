@@ -39,12 +39,11 @@ impl Player {
         let mut faulted = false;
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
         for slave in &scenario.plan.setup.slaves {
-            let known = self
-                .known()
-                .iter()
-                .find(|known| known.slave.address == slave.address);
-            let Some(known) = known else { continue };
-            let (address, ppo) = (slave.address, known.ppo());
+            let address = slave.address;
+            let Some(known) = self.known_at(address) else {
+                continue;
+            };
+            let ppo = known.ppo();
             talk.restart(address);
             talk.start(address, ppo, None)?;
             let off = Image {
@@ -54,7 +53,7 @@ impl Player {
             talk.exchange(address, ppo, &off)?;
             if !self.restarts {
                 // A slave whose terminals control it during the scenario goes on holding this word.
-                idle((address, ppo), &mut talk)?;
+                idle(address, ppo, &mut talk)?;
             }
             for (parameter, index, value) in &slave.parameters {
                 let ind = index.ind(parameter);
@@ -88,10 +87,7 @@ impl Player {
             }
             false => {
                 for slave in &scenario.plan.setup.slaves {
-                    let known = self
-                        .known()
-                        .iter()
-                        .find(|known| known.slave.address == slave.address);
+                    let known = self.known_at(slave.address);
                     let ppo = match switches {
                         true => slave.ppo,
                         false => known.map(Known::ppo).unwrap_or_default(),
@@ -99,9 +95,9 @@ impl Player {
                     if switches {
                         talk.start(slave.address, ppo, None)?;
                     }
-                    let zsw = idle((slave.address, ppo), &mut talk)?;
+                    let zsw = idle(slave.address, ppo, &mut talk)?;
                     faulted |= zsw & zsw::FAULT != 0;
-                    self.without_fault((slave.address, ppo), zsw, &mut talk)?;
+                    self.without_fault(slave.address, ppo, zsw, &mut talk)?;
                     match self.limits.bus_settings {
                         true => talk.unlock(slave.address)?,
                         false => talk.start(slave.address, ppo, Some(FORGET))?,
@@ -124,7 +120,8 @@ impl Player {
     /// Acknowledges a fault that a slave in the exchange shows, where the bench may: the terminals may start the motor then. It is idle afterwards.
     pub(in crate::rig) fn without_fault(
         &self,
-        (slave, ppo): (u8, PpoType),
+        slave: u8,
+        ppo: PpoType,
         zsw: u16,
         talk: &mut Talk<'_>,
     ) -> Result<(), TalkError> {
@@ -152,10 +149,7 @@ impl Player {
 }
 
 /// Gives a slave in the exchange the word that it holds when a scenario begins. Returns its status word.
-pub(in crate::rig) fn idle(
-    (slave, ppo): (u8, PpoType),
-    talk: &mut Talk<'_>,
-) -> Result<u16, TalkError> {
+pub(in crate::rig) fn idle(slave: u8, ppo: PpoType, talk: &mut Talk<'_>) -> Result<u16, TalkError> {
     let image = Image {
         words: [IDLE, 0, 0, 0, 0, 0],
         ..Image::default()

@@ -224,8 +224,7 @@ impl Player {
         let bench = &scenario.plan.setup;
         for slave in &bench.slaves {
             let address = slave.address;
-            let mut known = self.known().iter();
-            let Some(known) = known.find(|known| known.slave.address == address) else {
+            let Some(known) = self.known_at(address) else {
                 return Some(format!("the rig has no slave {address}"));
             };
             if !self.may_switch(known.ppo(), slave.ppo) {
@@ -267,7 +266,7 @@ impl Player {
         named.find_map(|property| {
             scenario.plan.setup.slaves.iter().find_map(|slave| {
                 let address = slave.address;
-                let known = self.known().iter().find(|known| known.slave.address == address)?;
+                let known = self.known_at(address)?;
                 let wanted = value_of(property, &slave.properties);
                 let has = value_of(property, &known.properties);
                 let name = property.name;

@@ -57,7 +57,8 @@ pub(super) struct Differs {
 /// Where the slaves as they are known differ.
 pub(super) fn right_slaves_send(
     known: &[Known],
-    (rate, most_lost): (BusRate, usize),
+    rate: BusRate,
+    most_lost: usize,
     turns: &[Turn],
     beats: &Beats,
 ) -> Result<Vec<usize>, Differs> {

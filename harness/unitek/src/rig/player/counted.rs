@@ -134,7 +134,8 @@ impl<'t> Conversation<'t> {
 pub(super) fn counted(
     talk: &Exchange,
     came: &[Came],
-    (axis, tolerance): (Axis, Span),
+    axis: Axis,
+    tolerance: Span,
 ) -> Option<Shown> {
     let all = Conversation::of(talk, came, axis)?;
     let lossy = tolerance > Span::ZERO;
@@ -216,7 +217,7 @@ mod tests {
         let came: Vec<_> = cycles
             .chain([reply(21 + late, 0xD9), reply(631, 0x67)])
             .collect();
-        counted(&talk, &came, (AXIS, Span::from_millis(tolerance)))
+        counted(&talk, &came, AXIS, Span::from_millis(tolerance))
     }
 
     /// App 8: the table has eight places. A frame or two may be lost by an adapter.
@@ -240,6 +241,6 @@ mod tests {
     fn a_single_cycle_is_not_counted() {
         let request = |millis: u64, every: &str| (at(millis), frame(format!("201#3D1B{every}")));
         let talk = exchange(vec![request(10, "32"), request(500, "FF")]);
-        assert_eq!(counted(&talk, &[], (AXIS, Span::ZERO)), None);
+        assert_eq!(counted(&talk, &[], AXIS, Span::ZERO), None);
     }
 }

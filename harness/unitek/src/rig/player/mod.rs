@@ -134,7 +134,8 @@ impl Player {
         rate: BitRate,
         patience: Span,
         limits: Limits,
-        (capabilities, remote): (Vec<Capability>, bool),
+        capabilities: Vec<Capability>,
+        remote: bool,
     ) -> Self {
         Self {
             axes,

@@ -144,7 +144,7 @@ impl DriveNote {
         };
         let tried = std::iter::once(0).chain(before).map(|heard| {
             self.begun
-                .could_deviate(known, (&setup, heard), told, self.wrong)
+                .could_deviate(known, &setup, heard, told, self.wrong)
         });
         let mut refuted = Some(false);
         for shows in tried {
@@ -173,7 +173,7 @@ impl DriveNote {
             if let Some(properties) = all.get_mut(place) {
                 *properties = **value;
             }
-            phases(EACH_PHASE).any(|phase| self.shows(Other::Right, &all, (phase, 0)))
+            phases(EACH_PHASE).any(|phase| self.shows(Other::Right, &all, phase, 0))
         };
         values.iter().filter(explains).collect()
     }
@@ -202,26 +202,26 @@ impl DriveNote {
             Other::Right => 1,
             Other::Deviates(..) => EACH_PHASE,
         };
-        if phases(each).any(|phase| self.shows(other, &known, (phase, 0))) {
+        if phases(each).any(|phase| self.shows(other, &known, phase, 0)) {
             return true;
         }
         match other {
             Other::Deviates(..) => {
                 let mut heard = HEARD_BEFORE;
-                heard.any(|heard| self.shows(other, &known, (Span::ZERO, heard)))
+                heard.any(|heard| self.shows(other, &known, Span::ZERO, heard))
             }
             Other::Right => self.drives.iter().enumerate().any(|(place, drive)| {
                 drive.candidates().into_iter().any(|properties| {
                     let mut all = known.clone();
                     all[place] = properties;
-                    self.shows(other, &all, (Span::ZERO, 0))
+                    self.shows(other, &all, Span::ZERO, 0)
                 })
             }),
         }
     }
 
     /// Plays the attempt on a model, whose clock is ahead and which has heard some requests before.
-    fn shows(&self, other: Other, properties: &[Properties], (phase, heard): (Span, u8)) -> bool {
+    fn shows(&self, other: Other, properties: &[Properties], phase: Span, heard: u8) -> bool {
         let mut player = self.begun.clone();
         player.beats.beat();
         let drives = self.drives.iter().zip(properties).enumerate();

@@ -74,8 +74,8 @@ impl Player {
             foretell(&self.left, std::slice::from_ref(known), &written, given);
             probe::settle(known, link, self.patience)?;
             if self.qualifies {
-                let times = (self.patience, self.rate);
-                probe::settle_within(known, link, times, &self.limits, free)?;
+                let (patience, rate) = (self.patience, self.rate);
+                probe::settle_within(known, link, patience, rate, &self.limits, free)?;
             }
             self.left.foretell(Vec::new(), None);
             self.profile.settle(known, self.rate)?;
@@ -161,9 +161,9 @@ mod tests {
             rx: 0x201,
             tx: 0x181,
         };
-        let patience = Span::from_millis(20);
-        let can = (Bench::CAPABILITIES.to_vec(), true);
-        let mut player = Player::of(vec![axis], BitRate::K500, patience, Limits::default(), can);
+        let (patience, limits) = (Span::from_millis(20), Limits::default());
+        let can = Bench::CAPABILITIES.to_vec();
+        let mut player = Player::of(vec![axis], BitRate::K500, patience, limits, can, true);
         let mut value = |player: &mut Player, change: UnknownRegister| {
             player
                 .learn(&mut Observed::new(&mut bench))

@@ -166,7 +166,7 @@ impl Player {
             Ok(came) => came,
             Err(why) => return Shown::Unknown(why),
         };
-        if let Some(shown) = counted(talk, &came, (known.axis, told.way.tolerance)) {
+        if let Some(shown) = counted(talk, &came, known.axis, told.way.tolerance) {
             return shown;
         }
         let judged = |properties, late: Span, (overtakes, complete), most_lost| {
@@ -176,7 +176,7 @@ impl Player {
                 most_lost,
                 ..conversation(talk, &came, late)
             };
-            let world = self.world((known, properties), &unlike, told);
+            let world = self.world(known, properties, &unlike, told);
             let world = match changed {
                 true => world.disturbed(),
                 false => world,
@@ -192,11 +192,11 @@ impl Player {
                 Judged::Wrong(..) => {}
             }
         }
-        let right = self.world((known, known.properties), &unlike, told);
+        let right = self.world(known, known.properties, &unlike, told);
         let others = known.candidates().into_iter();
         let others = others.filter(|properties| {
             self.beats.beat();
-            let other = self.world((known, *properties), &unlike, told);
+            let other = self.world(known, *properties, &unlike, told);
             !say_the_same(&right, &other, told)
         });
         let mut wrong = None;
@@ -223,7 +223,7 @@ impl Player {
         };
         let missing = expected.filter(|_| told.way.tolerance > Span::ZERO && loses());
         let register = missing.and_then(|frame| frame.data().first().copied());
-        let why = words(known, (&came, place), expected);
+        let why = words(known, &came, place, expected);
         let asked = expected.and_then(|frame| frame.data().first().copied());
         match register {
             Some(_) => Shown::Lost(register, format!("{why}: {LOST}")),
@@ -241,7 +241,8 @@ impl Player {
     pub(super) fn could_deviate(
         &self,
         known: &Known,
-        (setup, more): (&DriveSetup, u8),
+        setup: &DriveSetup,
+        more: u8,
         shown: &Told,
         wrong: bool,
     ) -> Option<bool> {
@@ -313,7 +314,8 @@ impl Player {
 
     fn world(
         &self,
-        (known, properties): (&Known, Properties),
+        known: &Known,
+        properties: Properties,
         unlike: &Arc<BTreeSet<u8>>,
         told: &Told,
     ) -> World {
@@ -464,7 +466,8 @@ fn say_the_same(one: &World, other: &World, told: &Told) -> bool {
 /// What no right drive would have sent.
 fn words(
     known: &Known,
-    (came, place): (&[(Instant, Instant, Frame)], usize),
+    came: &[(Instant, Instant, Frame)],
+    place: usize,
     expected: Option<Frame>,
 ) -> String {
     let node = known.axis.node;

@@ -59,7 +59,7 @@ fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
 
 /// Whether right slaves send this over a line that loses at most `most_lost` telegrams.
 fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usize>, Differs> {
-    right_slaves_send(known, (BusRate::K500, most_lost), turns, &Beats::default())
+    right_slaves_send(known, BusRate::K500, most_lost, turns, &Beats::default())
 }
 
 fn judged(turns: &[Turn]) -> Result<(), Differs> {
