@@ -152,7 +152,7 @@ fn make_safe(
     let ppo = found
         .or(slave.ppo)
         .ok_or("its configuration is of no PPO type")?;
-    let mut off = Off {
+    let mut off = Shutdown {
         talk,
         address,
         ppo,
@@ -245,14 +245,14 @@ fn has_left(error: &TalkError) -> bool {
 }
 
 /// An inverter on its way to the safe state.
-struct Off<'t, 'l> {
+struct Shutdown<'t, 'l> {
     talk: &'t mut Talk<'l>,
     address: u8,
     ppo: PpoType,
     standing: &'t Standstill,
 }
 
-impl Off<'_, '_> {
+impl Shutdown<'_, '_> {
     /// One exchange with a control word and setpoint 0; a slave that is not in the exchange is taken into it first. It leaves it again where the
     /// computer stands still for longer than the DP watchdog, and is then taken into it once more. Gives the status word.
     fn exchange(&mut self, word: u16) -> Result<u16, String> {

@@ -4,7 +4,7 @@
 //! begin no telegram, and those of one that does not go on, leave as they came.
 
 use super::language::Nordac;
-use super::language::now::{NotNow, now};
+use super::language::now::{StepError, now};
 use super::live::Recorder;
 use super::simulate::Bench;
 use harness_bench::counted::counted;
@@ -382,8 +382,8 @@ impl ServedBus for SegmentServer {
             Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
             Ok(step) => match now(&mut self.bench, &step) {
                 Ok(()) => ControlAnswer::Ok,
-                Err(NotNow::Otherwise(found)) => ControlAnswer::No(found),
-                Err(NotNow::Refused(why)) => ControlAnswer::Error(why.to_owned()),
+                Err(StepError::Otherwise(found)) => ControlAnswer::No(found),
+                Err(StepError::Refused(why)) => ControlAnswer::Error(why.to_owned()),
             },
         })
     }

@@ -110,7 +110,6 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// What a simulated bench can do.
     pub(crate) const CAPABILITIES: [Capability; 9] = [
         Capability::Interposer,
         Capability::Tap,

@@ -15,7 +15,6 @@ use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// The highest number of a drive.
 const MOST_NODES: u16 = 127;
 
 /// A scenario that replays a capture. `setup` describes the drives: its lines `drive` and `rate` become the header; without it, drives

@@ -11,7 +11,6 @@ use harness_proto::unitek::words::{self, Bit};
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX, REGISTERS, frame};
 use std::fmt::Write as _;
 
-/// The longest name of a signal.
 const MAX_NAME: usize = 32;
 
 /// Bits of a position that are one turn (6.1, App 6).
@@ -21,9 +20,8 @@ const TURN: f64 = 65_536.0;
 const FULL_SPEED: f64 = 32_767.0;
 const FULL_TORQUE: f64 = 21_845.0;
 
-/// How a signal is selected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Selected {
+enum Selection {
     /// It selects others, and is always there.
     Selector,
     /// It is there for one value of REGID.
@@ -33,7 +31,7 @@ enum Selected {
 /// One signal: bits of a message, lowest byte first.
 struct Signal {
     name: String,
-    selected: Selected,
+    selected: Selection,
     /// The first bit of the message.
     start: u8,
     bits: u8,
@@ -48,7 +46,7 @@ struct Signal {
 
 impl Signal {
     /// An unsigned number without a unit.
-    fn plain(name: &str, selected: Selected, start: u8, bits: u8) -> Self {
+    fn plain(name: &str, selected: Selection, start: u8, bits: u8) -> Self {
         Self {
             name: name.to_owned(),
             selected,
@@ -139,7 +137,7 @@ fn messages(drive: u16, drives: u16) -> [Message; 2] {
 }
 
 fn regid() -> Signal {
-    Signal::plain("REGID", Selected::Selector, 0, 8)
+    Signal::plain("REGID", Selection::Selector, 0, 8)
 }
 
 /// Whether a write does something: functions are started by a write, and 3D is a read.
@@ -158,13 +156,13 @@ fn read_request() -> Vec<Signal> {
         Signal {
             values: named.collect(),
             comment: "The register that the drive sends".to_owned(),
-            ..Signal::plain("READ", Selected::By(frame::READ), 8, 8)
+            ..Signal::plain("READ", Selection::By(frame::READ), 8, 8)
         },
         Signal {
             unit: "ms",
             values: interval,
             comment: "How often the drive sends the register: 0 once, 255 no longer".to_owned(),
-            ..Signal::plain("INTERVAL", Selected::By(frame::READ), 16, 8)
+            ..Signal::plain("INTERVAL", Selection::By(frame::READ), 16, 8)
         },
     ]
 }
@@ -180,7 +178,7 @@ fn of_register(register: &Register) -> Vec<Signal> {
         },
         signed: register.signed,
         comment: comment(register),
-        ..Signal::plain(&name(register), Selected::By(register.number), 8, 16)
+        ..Signal::plain(&name(register), Selection::By(register.number), 8, 16)
     };
     match register.unit {
         Unit::Ramp => ramp(&signal),
@@ -312,8 +310,8 @@ fn declaration(text: &mut String, message: &Message) {
     );
     for signal in &message.signals {
         let selected = match signal.selected {
-            Selected::Selector => "M".to_owned(),
-            Selected::By(regid) => format!("m{regid}"),
+            Selection::Selector => "M".to_owned(),
+            Selection::By(regid) => format!("m{regid}"),
         };
         let (least, greatest) = signal.range();
         put(

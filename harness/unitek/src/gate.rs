@@ -86,7 +86,6 @@ const fn never(why: String) -> Denied {
     }
 }
 
-/// Why no octet leaves through this gate.
 fn no_octets() -> Denied {
     never("octets are not sent: a CAN bus carries frames".to_owned())
 }

@@ -149,14 +149,14 @@ enum End {
 
 /// Why a drive is not confirmed.
 #[derive(Debug, thiserror::Error)]
-enum NotSafe {
+enum SafetyError {
     #[error(transparent)]
     Call(#[from] Error),
     #[error("{0}")]
     Reads(String),
 }
 
-impl NotSafe {
+impl SafetyError {
     const fn end(&self) -> End {
         match self {
             Self::Call(Error::NoReply { .. }) => End::Silent,
@@ -267,7 +267,7 @@ fn make_safe(
     axis: Axis,
     cycles: &[u8],
     standing: &Standstill,
-) -> Result<String, NotSafe> {
+) -> Result<String, SafetyError> {
     let mut why = Ok(());
     let mut note = |done: Result<(), Error>| {
         if why.is_ok() {
@@ -297,7 +297,7 @@ fn make_safe(
     let (mode, speed, torque) = (value(mode?), value(speed?), value(torque?));
     let locks = standing.order.contains(&StandstillStep::Block);
     if locks && (mode & MODE_LOCK == 0 || speed != 0 || torque != 0) {
-        return Err(NotSafe::Reads(format!(
+        return Err(SafetyError::Reads(format!(
             "MODE reads {mode:04X}, the speed command {speed:04X}, the torque command {torque:04X}"
         )));
     }
@@ -305,7 +305,7 @@ fn make_safe(
     let (ready, errors, state) = (value(ready?), errors?.data.bits(), state?.data.bits());
     if locks && state & status::ENABLED != 0 {
         let why = format!("STATUS reads {state:X}: the drive is enabled");
-        return Err(NotSafe::Reads(why));
+        return Err(SafetyError::Reads(why));
     }
     let errors: Vec<_> = set_bits(ERRORS, errors).map(|bit| bit.name).collect();
     let errors = match errors.is_empty() {
@@ -325,7 +325,7 @@ const fn low(bits: u32) -> u16 {
 }
 
 /// Waits until a drive stands.
-fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<(), NotSafe> {
+fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<(), SafetyError> {
     let full = driver.read(axis, 0xCE)?;
     let full = f64::from(low(full.data.bits()));
     let end = driver.now() + standing.within;
@@ -348,7 +348,7 @@ fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<
                 scaling,
             );
             let percent = speed.map_or_else(String::new, |speed| format!(" ({speed})"));
-            return Err(NotSafe::Reads(format!(
+            return Err(SafetyError::Reads(format!(
                 "waited {} for it to stand; its speed is {rpm:.0} rpm{percent}",
                 standing.within
             )));

@@ -1,7 +1,7 @@
 //! Simulated UNITEK drives that clients share, in real time.
 
 use super::language::Unitek;
-use super::language::now::{NotNow, now};
+use super::language::now::{StepError, now};
 use super::simulate::{Bench, DriveSetup, Setup};
 use harness_bench::counted::counted;
 use harness_bench::scenario::parse::header::{Part, parse_step, read};
@@ -166,8 +166,8 @@ impl SharedBus for SharedDrives {
             Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
             Ok(step) => match now(&mut self.bench, &step) {
                 Ok(()) => ControlAnswer::Ok,
-                Err(NotNow::Otherwise(found)) => ControlAnswer::No(found),
-                Err(NotNow::Refused(why)) => ControlAnswer::Error(why.to_owned()),
+                Err(StepError::Otherwise(found)) => ControlAnswer::No(found),
+                Err(StepError::Refused(why)) => ControlAnswer::Error(why.to_owned()),
             },
         })
     }

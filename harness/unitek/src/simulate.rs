@@ -129,7 +129,6 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// What a simulated bench can do.
     pub(crate) const CAPABILITIES: [Capability; 8] = [
         Capability::Interposer,
         Capability::Tap,

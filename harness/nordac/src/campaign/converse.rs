@@ -37,18 +37,15 @@ const CYCLE: Span = Span::from_millis(20);
 /// How often the master starts the slave again in one step.
 const MOST_STARTS: u8 = 2;
 
-/// The most exchanges of a task.
 const MOST_EXCHANGES: u8 = 8;
 
 /// Behind the last step: what is late arrives.
 const REST: Span = Span::from_millis(50);
 
-/// What a step brought.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum StepEnd {
     /// The slave exchanges data.
     Started,
-    /// The inputs of an exchange.
     Exchanged(Image),
     /// The answer of the parameter channel, as it stands in the inputs.
     Answered(String),
@@ -287,7 +284,6 @@ impl Desk {
         }
     }
 
-    /// Takes what has come.
     fn take_heard(&mut self) -> Vec<Received> {
         let host = self.line.station_mut(MASTER).host_mut();
         let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, octet)| octet));

@@ -15,13 +15,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 const STEP: Span = Span::from_micros(500);
 
 /// Where the master of a bench is kept between two requests.
-pub(crate) type Parked = Arc<Mutex<Option<Driver<'static>>>>;
+pub(crate) type ParkedDriver = Arc<Mutex<Option<Driver<'static>>>>;
 
 /// The master of a bench while a request uses it. It is kept with its slaves for the next request.
 pub(super) struct Master<'l> {
     driver: Driver<'l>,
     options: Options,
-    parked: Parked,
+    parked: ParkedDriver,
 }
 
 impl<'l> Deref for Master<'l> {
@@ -40,16 +40,16 @@ impl DerefMut for Master<'_> {
 
 impl Drop for Master<'_> {
     fn drop(&mut self) {
-        let none = Driver::new(Box::new(Unplugged), self.options);
-        let driver = std::mem::replace(&mut self.driver, none).onto(Box::new(Unplugged));
+        let none = Driver::new(Box::new(UnpluggedLine), self.options);
+        let driver = std::mem::replace(&mut self.driver, none).onto(Box::new(UnpluggedLine));
         *self.parked.lock().unwrap_or_else(PoisonError::into_inner) = Some(driver);
     }
 }
 
 /// The line of a master that is kept: it carries nothing.
-struct Unplugged;
+struct UnpluggedLine;
 
-impl Line for Unplugged {
+impl Line for UnpluggedLine {
     fn medium(&self, _port: usize) -> Medium {
         harness_proto::line::Rate::default().into()
     }

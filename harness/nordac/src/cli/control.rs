@@ -2,7 +2,7 @@
 //! `block`, and `go` in a session.
 
 use super::bench::driver;
-use crate::driver::{Driver, Error, MASTER, Reached};
+use crate::driver::{Driver, Error, MASTER, ReachedState};
 use crate::rig::{Inverters, Session};
 use crate::value::{ExchangeStep, percentage, status, steps};
 use harness_bench::command::cyclic::{
@@ -27,7 +27,6 @@ const TIME_OUT: &str = "1625";
 /// As long as a rig may be held, in seconds.
 const YEAR: u64 = 365 * 24 * 3_600;
 
-/// Switches slaves on with this setpoint.
 fn switch_on(
     driver: &mut Driver<'_>,
     command: &str,
@@ -256,7 +255,7 @@ pub(super) fn on(
 }
 
 /// A call that stops a motor.
-pub(super) type Stop = fn(&mut Driver<'_>, u8) -> Result<Reached, Error>;
+pub(super) type Stop = fn(&mut Driver<'_>, u8) -> Result<ReachedState, Error>;
 
 /// Stops motors; needs no permission.
 pub(super) fn stop(
@@ -345,7 +344,6 @@ fn supervised(driver: &mut Driver<'_>, slave: u8, needed: bool) -> Result<i64, E
     }
 }
 
-/// Refuses to let motors turn without permission.
 fn refuse_motion(allowed: bool, command: &str, slaves: &[u8]) -> Result<(), Failure> {
     match allowed {
         true => Ok(()),
@@ -386,7 +384,7 @@ const fn enables(word: u16) -> bool {
 }
 
 /// The control words that led to a state, and the reply that shows it.
-fn sent(reached: &Reached) -> String {
+fn sent(reached: &ReachedState) -> String {
     let words: Vec<_> = reached.words().map(|word| format!("{word:04X}")).collect();
     format!("STW {} -> {}", words.join(", "), reply(&reached.inputs))
 }

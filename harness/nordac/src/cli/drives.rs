@@ -3,7 +3,7 @@
 use super::bench::driver;
 use super::info::{info, top};
 use super::params::PARAMETERS;
-use super::read::{Found, find};
+use super::read::{ReadCell, find};
 use crate::rig::{Inverters, OfNordac as _, RigSlave, Session};
 use crate::value::{Assignment, Cell, cells};
 use harness_bench::command::check::CheckedDrive;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 impl CommandDrives for Inverters {
     type Cell = Cell;
-    type Reading = Found;
+    type Reading = ReadCell;
     type Parameter = Assignment;
 
     const PARAMETERS: ParameterFile<Self, Assignment> = PARAMETERS;
@@ -29,7 +29,11 @@ impl CommandDrives for Inverters {
         cells(texts)
     }
 
-    fn read(session: &mut Session, slaves: &[u8], cells: &[Cell]) -> Result<Vec<Found>, Failure> {
+    fn read(
+        session: &mut Session,
+        slaves: &[u8],
+        cells: &[Cell],
+    ) -> Result<Vec<ReadCell>, Failure> {
         let mut driver = driver(session);
         let mut found = Vec::new();
         for slave in slaves {

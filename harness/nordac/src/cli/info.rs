@@ -2,7 +2,7 @@
 
 use super::bench::driver;
 use super::control::send_off;
-use super::read::{Found, find};
+use super::read::{ReadCell, find};
 use crate::driver::{Driver, Error};
 use crate::live;
 use crate::report::Reader;
@@ -34,16 +34,15 @@ const SHOWN: [(&str, &str); 10] = [
     ("hours", "1808"),
 ];
 
-/// A slave as it was found.
-struct Seen {
+struct SlaveReading {
     slave: u8,
     ppo: PpoType,
     /// The process words, and the parameters.
-    words: Vec<Found>,
-    parameters: Vec<(&'static str, Found)>,
+    words: Vec<ReadCell>,
+    parameters: Vec<(&'static str, ReadCell)>,
 }
 
-impl Seen {
+impl SlaveReading {
     /// What is shown, each with its heading and where it stands.
     fn rows(&self) -> Vec<[String; 3]> {
         let mut rows = vec![[
@@ -68,7 +67,7 @@ impl Seen {
 }
 
 /// A value in words; 0 is no fault, and no time-out.
-fn value(found: &Found) -> String {
+fn value(found: &ReadCell) -> String {
     match (found.cell, found.number) {
         (Cell::Parameter(parameter), 0) if matches!(parameter.parameter.number, 1800..=1805) => {
             "none".to_owned()
@@ -84,7 +83,11 @@ fn value(found: &Found) -> String {
 }
 
 /// Reads the process words of a slave, and some of what is shown of its parameters.
-fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Result<Seen, Error> {
+fn look(
+    driver: &mut Driver<'_>,
+    slave: u8,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<SlaveReading, Error> {
     let ppo = driver.join(slave)?;
     let words = [ReplyWord::Status, ReplyWord::Actual].map(Cell::Word);
     let words = find(driver, slave, &words)?;
@@ -98,7 +101,7 @@ fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Re
             parameters.extend(found.into_iter().map(|found| (name, found)));
         }
     }
-    Ok(Seen {
+    Ok(SlaveReading {
         slave,
         ppo,
         words,
@@ -177,8 +180,8 @@ static FORM: TopForm = TopForm {
     ],
 };
 
-fn row(seen: &Seen) -> TopRow {
-    let mut words = seen.words.iter().map(Found::words);
+fn row(seen: &SlaveReading) -> TopRow {
+    let mut words = seen.words.iter().map(ReadCell::words);
     let (status, actual) = (words.next(), words.next());
     let mut numbers = seen.words.iter().map(|word| word.number as u16);
     let (zsw, hiw) = (numbers.next().unwrap_or(0), numbers.next());

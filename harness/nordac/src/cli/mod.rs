@@ -12,7 +12,7 @@ mod write;
 
 use super::driver;
 use crate::rig::{Inverters, Player, Session};
-pub(super) use bench::Parked;
+pub(super) use bench::ParkedDriver;
 use control::Stop;
 use harness_bench::command::cyclic::CyclicCommand;
 use harness_bench::command::drive::DriveCommand;

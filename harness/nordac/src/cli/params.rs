@@ -6,7 +6,7 @@
 //! ```
 
 use super::bench::driver;
-use super::read::Found;
+use super::read::ReadCell;
 use super::write::refuse_denied;
 use crate::driver::{Driver, Error};
 use crate::rig::{Inverters, Session};
@@ -25,7 +25,6 @@ const NOT_KEPT: [u16; 5] = [970, 971, 1602, 1603, 1604];
 /// them.
 const REACHED: [u16; 6] = [1619, 1620, 1621, 1622, 1623, 1624];
 
-/// Whether a file keeps a parameter.
 fn is_kept(parameter: &Parameter) -> bool {
     !parameter.has(Flag::ReadOnly) && !NOT_KEPT.contains(&parameter.number)
 }
@@ -90,7 +89,7 @@ fn read(session: &mut Session, slave: u8) -> Result<Vec<String>, Failure> {
     Ok(found.iter().filter_map(line).collect())
 }
 
-fn line(found: &Found) -> Option<String> {
+fn line(found: &ReadCell) -> Option<String> {
     let Cell::Parameter(cell) = found.cell else {
         return None;
     };

@@ -8,14 +8,14 @@ use harness_proto::nordac::PkwError;
 use serde_json::{Value, json};
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Found {
+pub(crate) struct ReadCell {
     pub(super) slave: u8,
     pub(super) cell: Cell,
     /// A word, or a number in steps of the parameter's unit.
     pub(super) number: i64,
 }
 
-impl Found {
+impl ReadCell {
     /// The digits as they travel.
     fn raw(&self) -> String {
         match self.cell {
@@ -57,7 +57,7 @@ pub(super) fn find(
     driver: &mut Driver<'_>,
     slave: u8,
     cells: &[Cell],
-) -> Result<Vec<Found>, Error> {
+) -> Result<Vec<ReadCell>, Error> {
     let mut found = Vec::new();
     let mut absent = false;
     for &cell in cells {
@@ -74,7 +74,7 @@ pub(super) fn find(
                 other => other?,
             },
         };
-        found.push(Found {
+        found.push(ReadCell {
             slave,
             cell,
             number,
@@ -83,7 +83,7 @@ pub(super) fn find(
     Ok(found)
 }
 
-impl CellReading for Found {
+impl CellReading for ReadCell {
     const COLUMNS: &'static [&'static str] = &["slave", "PNU", "name", "raw", "value", "section"];
     const LIST: &'static str = "cells";
 

@@ -1,7 +1,7 @@
 //! `drivebench write` on NORDAC inverters: parameters are written, and the value that the inverter answers is shown.
 
 use super::bench::driver;
-use crate::driver::{Driver, Error, Written};
+use crate::driver::{Driver, Error, WriteResult};
 use crate::rig::Inverters;
 use crate::value::{Assignment, assignments, shown};
 use harness_bench::command::drive::WriteArguments;
@@ -83,11 +83,11 @@ fn one(
     let known = parameter.parameter;
     let name = format!("slave {slave}: {parameter} {}", known.name);
     match driver.write(slave, &parameter, number) {
-        Ok(Written::Holds(holds)) => {
+        Ok(WriteResult::Holds(holds)) => {
             output.result(&format!("{name} = {}\n", shown(&parameter, holds)))?;
             Ok((Some(slave), Exit::Passed))
         }
-        Ok(Written::Restarted) => {
+        Ok(WriteResult::Restarted) => {
             let at = match known.number {
                 ADDRESS => u8::try_from(number).unwrap_or(slave),
                 number if FACTORY.contains(&number) => DEFAULT_ADDRESS,

@@ -4,9 +4,8 @@ use super::{Driver, Error};
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::{Answer, ParameterRef};
 
-/// What became of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Written {
+pub(crate) enum WriteResult {
     /// The slave answered with the value that it holds now.
     Holds(i64),
     /// The module restarted (NORDAC 2.6): it has left the exchange, and its answer is never seen.
@@ -37,14 +36,14 @@ impl Driver<'_> {
         slave: u8,
         parameter: &ParameterRef,
         number: i64,
-    ) -> Result<Written, Error> {
+    ) -> Result<WriteResult, Error> {
         let place = self.channel(slave)?;
         // Numbers that no parameter holds are found where they are read.
         let raw = parameter.parameter.raw_of(number).unwrap_or_default();
         self.slaves[place].exchange.write(parameter, raw);
         let answer = match self.answer(place, parameter) {
             Err(Error::Left { .. }) if RESTARTS.contains(&parameter.parameter.number) => {
-                return Ok(Written::Restarted);
+                return Ok(WriteResult::Restarted);
             }
             other => other?,
         };
@@ -58,7 +57,7 @@ impl Driver<'_> {
                 reads,
             });
         }
-        Ok(Written::Holds(reads))
+        Ok(WriteResult::Holds(reads))
     }
 
     /// The place of a slave with a parameter channel.

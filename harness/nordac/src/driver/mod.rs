@@ -9,9 +9,9 @@ mod error;
 mod motion;
 mod phy;
 
-pub(crate) use channel::Written;
+pub(crate) use channel::WriteResult;
 pub(crate) use error::{Error, fault_name};
-pub(crate) use motion::{Reached, percent};
+pub(crate) use motion::{ReachedState, percent};
 pub(crate) use phy::Timing;
 
 use super::rig::interlock::InverterInterlock;
@@ -76,7 +76,7 @@ struct Slave {
 
 /// What a start has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Started {
+pub(crate) struct StartReport {
     pub(crate) ppo: PpoType,
     /// The slave's diagnosis when it began to exchange.
     pub(crate) diagnosis: Option<Diagnosis>,
@@ -185,7 +185,6 @@ impl<'l> Driver<'l> {
         self.start(slave, None).map(|started| started.ppo)
     }
 
-    /// The time of its line.
     #[must_use]
     pub(crate) fn now(&self) -> Instant {
         self.wire.line().now()
@@ -247,7 +246,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NoReply`], [`Error::OtherDevice`], [`Error::Taken`], [`Error::Configuration`], [`Error::NotStarted`], [`Error::Link`].
-    pub(crate) fn start(&mut self, slave: u8, ppo: Option<PpoType>) -> Result<Started, Error> {
+    pub(crate) fn start(&mut self, slave: u8, ppo: Option<PpoType>) -> Result<StartReport, Error> {
         let found = self.diagnosis(slave)?;
         if found.ident != IDENT {
             let ident = found.ident;
@@ -286,7 +285,7 @@ impl<'l> Driver<'l> {
             }
         }
         let inputs = self.slaves[place].exchange.inputs().copied();
-        Ok(Started {
+        Ok(StartReport {
             ppo,
             diagnosis: self.wire.diagnosis,
             inputs: inputs.unwrap_or_default(),

@@ -14,14 +14,14 @@ const STANDS: Span = Span::from_millis(2_000);
 
 /// The state that a call has led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Reached {
+pub(crate) struct ReachedState {
     /// The control words that were sent, one for each step.
     pub(crate) steps: [u16; 3],
     /// The last inputs.
     pub(crate) inputs: Image,
 }
 
-impl Reached {
+impl ReachedState {
     /// The control words that were sent.
     pub(crate) fn words(&self) -> impl Iterator<Item = u16> {
         self.steps.into_iter().filter(|word| *word != 0)
@@ -39,7 +39,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::Fault`], [`Error::Local`], [`Error::NotReached`], [`Error::Left`], [`Error::Link`].
-    pub(crate) fn on(&mut self, slave: u8, setpoint: u16) -> Result<Reached, Error> {
+    pub(crate) fn on(&mut self, slave: u8, setpoint: u16) -> Result<ReachedState, Error> {
         self.look()?;
         let seen = self.cycle(slave)?;
         self.ready_for_words(slave, &seen)?;
@@ -54,14 +54,14 @@ impl Driver<'_> {
         let inputs = self.reach(slave, words, "operation enabled", |image| {
             State::of_zsw(image.first()) == Some(State::OperationEnabled)
         })?;
-        Ok(Reached { steps, inputs })
+        Ok(ReachedState { steps, inputs })
     }
 
     /// Stops a slave on its ramp and switches its output off: OFF1, 047E.
     ///
     /// # Errors
     /// [`Error::NotReached`], [`Error::Left`], [`Error::Link`].
-    pub(crate) fn off(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn off(&mut self, slave: u8) -> Result<ReachedState, Error> {
         self.stopped(slave, stw::READY, is_off)
     }
 
@@ -69,7 +69,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// See [`Self::off`].
-    pub(crate) fn block(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn block(&mut self, slave: u8) -> Result<ReachedState, Error> {
         self.stopped(slave, stw::SAFE, is_off)
     }
 
@@ -77,7 +77,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// See [`Self::off`].
-    pub(crate) fn quick_stop(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn quick_stop(&mut self, slave: u8) -> Result<ReachedState, Error> {
         self.stopped(slave, stw::QUICK_STOP, |image| {
             is_off(image) && bits(image) & (zsw::START_DISABLE | zsw::FAULT) != 0
         })
@@ -88,7 +88,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::NotReached`] while the cause of the fault is there. [`Error::Local`], [`Error::Left`], [`Error::Link`].
-    pub(crate) fn acknowledge(&mut self, slave: u8) -> Result<(Option<i64>, Reached), Error> {
+    pub(crate) fn acknowledge(&mut self, slave: u8) -> Result<(Option<i64>, ReachedState), Error> {
         let seen = self.exchange(slave, [stw::SAFE, 0, 0, 0])?;
         if seen.first() & zsw::BUS_CONTROL == 0 {
             return Err(Error::Local { slave });
@@ -97,14 +97,14 @@ impl Driver<'_> {
         if bits(&seen) & zsw::FAULT == 0 {
             let steps = [stw::SAFE, 0, 0];
             let inputs = seen;
-            return Ok((Some(0), Reached { steps, inputs }));
+            return Ok((Some(0), ReachedState { steps, inputs }));
         }
         let fault = self.fault(slave)?;
         let words = [stw::SAFE | stw::ACKNOWLEDGE, 0, 0, 0];
         let inputs = self.reach(slave, words, "no fault", |image| {
             bits(image) & zsw::FAULT == 0
         })?;
-        Ok((fault, Reached { steps, inputs }))
+        Ok((fault, ReachedState { steps, inputs }))
     }
 
     /// The number of the fault of a slave (1800), where it has a parameter channel.
@@ -159,7 +159,7 @@ impl Driver<'_> {
         slave: u8,
         word: u16,
         done: impl Fn(&Image) -> bool,
-    ) -> Result<Reached, Error> {
+    ) -> Result<ReachedState, Error> {
         let mut seen = self.exchange(slave, [word, 0, 0, 0])?;
         let mut changed = (self.now(), seen.main());
         while !done(&seen) {
@@ -172,7 +172,7 @@ impl Driver<'_> {
             seen = self.cycle(slave)?;
         }
         let steps = [word, 0, 0];
-        Ok(Reached {
+        Ok(ReachedState {
             steps,
             inputs: seen,
         })

@@ -45,7 +45,6 @@ impl Timing {
         }
     }
 
-    /// The slot time in bits.
     pub(super) fn slot_bits(self) -> u16 {
         let bits = self.patience.units() / self.rate.bit_time().units().max(1);
         // The master takes no shorter slot at the highest rate.
@@ -87,7 +86,6 @@ pub(super) struct Wire<'l> {
     asked: Option<Pdu>,
     /// Octets received that are no whole telegram yet.
     begun: Vec<u8>,
-    /// The reply, for the master.
     reply: Vec<u8>,
     /// How far the master's clock is ahead of the line's.
     ahead: Span,
@@ -119,7 +117,6 @@ impl<'l> Wire<'l> {
         }
     }
 
-    /// The line, to be changed.
     pub(super) fn line_mut(&mut self) -> &mut dyn Line {
         self.line.as_mut()
     }
@@ -146,7 +143,6 @@ impl<'l> Wire<'l> {
         }
     }
 
-    /// The master's time.
     pub(super) fn clock(&self) -> time::Instant {
         let now = self.line.now();
         let left_out = self.behind + self.left_out(now);
@@ -314,7 +310,6 @@ impl<'l> Wire<'l> {
         }
     }
 
-    /// Whether a telegram replies to a request.
     fn replies(&self, asked: &Pdu, telegram: &Telegram) -> bool {
         let Some(pdu) = telegram.pdu() else {
             return true;

@@ -87,7 +87,7 @@ fn parameters_are_read_and_written() {
         assert_eq!(driver.read(8, &parameter(name)), Ok(value), "{name}");
     }
     let third = parameter("1205.3");
-    assert_eq!(driver.write(8, &third, 500), Ok(Written::Holds(500)));
+    assert_eq!(driver.write(8, &third, 500), Ok(WriteResult::Holds(500)));
     assert_eq!(driver.read(8, &third), Ok(500));
     assert_eq!(driver.read(8, &parameter("1205.2")), Ok(700));
     for (name, value, error, hint) in [
@@ -132,7 +132,7 @@ fn a_slave_that_restarts() {
     driver.start(8, None).expect("a start");
     for (name, value) in [("1622", 1), ("1624", 9)] {
         let written = driver.write(8, &parameter(name), value);
-        assert_eq!(written, Ok(Written::Restarted), "{name}");
+        assert_eq!(written, Ok(WriteResult::Restarted), "{name}");
         if name == "1622" {
             assert_eq!(driver.start(8, None).expect("again").ppo, PpoType::Two);
         }
@@ -234,7 +234,7 @@ fn a_slave_under_local_control() {
         "{error}"
     );
     let two = driver.write(8, &parameter("Interface"), 2);
-    assert_eq!(two, Ok(Written::Holds(2)));
+    assert_eq!(two, Ok(WriteResult::Holds(2)));
     driver.on(8, 0).expect("the bus controls it");
 }
 

@@ -65,9 +65,9 @@ pub(super) struct Follower {
 }
 
 /// What differs, the section, and what was expected.
-pub(super) type Found = Option<(Symptom, &'static str, String)>;
+pub(super) type Mismatch = Option<(Symptom, &'static str, String)>;
 
-fn form(why: &str) -> Found {
+fn form(why: &str) -> Mismatch {
     Some((Form, "EN 1", why.to_owned()))
 }
 
@@ -115,7 +115,7 @@ impl Follower {
     }
 
     /// Compares a reply with what the request allows.
-    pub(super) fn judge(&mut self, request: &Pdu, reply: &Telegram, octets: &[u8]) -> Found {
+    pub(super) fn judge(&mut self, request: &Pdu, reply: &Telegram, octets: &[u8]) -> Mismatch {
         self.may_repeat = false;
         if request.da() == BROADCAST {
             return form("a request to all stations is answered");
@@ -150,7 +150,7 @@ impl Follower {
     }
 
     /// Who may reply, to whom, and with which service access points.
-    fn head(&self, function: Function, request: &Pdu, reply: &Telegram) -> Found {
+    fn head(&self, function: Function, request: &Pdu, reply: &Telegram) -> Mismatch {
         if function.is_sdn() {
             return form("a telegram without acknowledgement is answered");
         }
@@ -185,7 +185,7 @@ impl Follower {
     }
 
     /// Takes note of the count of a request. A repetition gets the last reply again, and what may be one is not compared: `Some`.
-    fn repetition(&mut self, request: &Pdu, octets: &[u8]) -> Option<Found> {
+    fn repetition(&mut self, request: &Pdu, octets: &[u8]) -> Option<Mismatch> {
         let control = request.fc();
         let (master, bit) = (request.sa(), control.fcb());
         let now = match control.fcv() || bit {
@@ -211,7 +211,7 @@ impl Follower {
         }
     }
 
-    fn service(&mut self, request: &Pdu, reply: &Telegram) -> Found {
+    fn service(&mut self, request: &Pdu, reply: &Telegram) -> Mismatch {
         let both = request.dsap().is_some() == request.ssap().is_some();
         let service = Service::of(request.dsap()).filter(|_| both);
         let confirmed = *reply == Telegram::Confirmation;
@@ -261,7 +261,7 @@ impl Follower {
         }
     }
 
-    fn set_up(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
+    fn set_up(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Mismatch {
         (self.exchanging, self.unanswered, self.shown) = (false, None, None);
         let prm = SetPrm::decode(request.data());
         let locks = prm
@@ -291,7 +291,7 @@ impl Follower {
         (!confirmed && !refused).then(|| (Form, "EN 2", "a confirmation is expected".to_owned()))
     }
 
-    fn configured(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
+    fn configured(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Mismatch {
         let was_exchanging = std::mem::replace(&mut self.exchanging, false);
         (self.unanswered, self.shown) = (None, None);
         let ppo = PpoType::from_cfg(request.data());
@@ -321,7 +321,7 @@ impl Follower {
             .then(|| (Form, "EN 2", "a confirmation or RS is expected".to_owned()))
     }
 
-    fn exchanged(&mut self, request: &Pdu, data: Option<&[u8]>, confirmed: bool) -> Found {
+    fn exchanged(&mut self, request: &Pdu, data: Option<&[u8]>, confirmed: bool) -> Mismatch {
         if confirmed {
             return Some((Form, "EN 2", "RS or the inputs are expected".to_owned()));
         }
@@ -364,7 +364,7 @@ impl Follower {
         self.inputs(&Image::decode(ppo, data)?, ppo.has_pkw())
     }
 
-    fn inputs(&mut self, image: &Image, tasks: bool) -> Found {
+    fn inputs(&mut self, image: &Image, tasks: bool) -> Mismatch {
         let [zsw, actual, third, _, rest @ ..] = image.words;
         if let Some((section, rule)) = wrong_status(zsw, actual) {
             return Some((
@@ -383,7 +383,7 @@ impl Follower {
         wrong.map(|(section, why)| (Value, section, why))
     }
 
-    fn diagnosis(&mut self, data: &[u8]) -> Found {
+    fn diagnosis(&mut self, data: &[u8]) -> Mismatch {
         let value = |why: String| Some((Value, "EN 2", why));
         if let Some(why) = wrong(data) {
             return value(why);

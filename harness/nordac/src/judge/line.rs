@@ -19,7 +19,6 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Differences and doubts that are kept at most.
 const MOST_BREACHES: usize = 50;
 
 /// In this time a slave can be switched off and be back.
@@ -43,7 +42,6 @@ pub(crate) struct Breach {
     pub(crate) about: String,
 }
 
-/// What came of judging telegrams.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct JudgedSlaves {
     /// What differs, in order.
@@ -61,7 +59,7 @@ pub(crate) struct JudgedSlaves {
 
 /// A request that was understood, and its number.
 #[derive(Debug)]
-struct Asked {
+struct HeardRequest {
     number: usize,
     /// `None` for octets to which no slave may reply.
     pdu: Option<Pdu>,
@@ -129,7 +127,6 @@ fn is_undamaged(said: &HeardTelegram) -> bool {
     reasons.contains(&reason) && body.is_some_and(|(body, fcs)| check_sum(body) == *fcs)
 }
 
-/// Whether octets are the beginning of a telegram.
 fn is_begun(run: &TelegramRun) -> bool {
     let said = run.said().filter(|said| said.error.is_none());
     said.is_some_and(|said| matches!(Telegram::decode(&said.octets), Decoded::NeedMore))
@@ -154,7 +151,7 @@ struct Judge {
     /// What the telegrams show of each slave if it was switched off and on in its last silence in which a restart fits, and when that
     /// began; until the slave shows that it was not.
     restarted: BTreeMap<u8, (Instant, Follower)>,
-    asked: Option<Asked>,
+    asked: Option<HeardRequest>,
     /// Whether a slave is judged; one that is not in it is.
     standings: BTreeMap<u8, Standing>,
     /// Replies of slaves that are not judged.
@@ -228,7 +225,6 @@ impl Judge {
         }
     }
 
-    /// Notes what accuses no slave.
     fn doubt(&mut self, about: String) {
         if self.judged.doubts.len() < MOST_BREACHES {
             self.judged.doubts.push(about);
@@ -285,7 +281,7 @@ impl Judge {
                 }
             });
         }
-        self.asked = Some(Asked {
+        self.asked = Some(HeardRequest {
             number,
             pdu,
             doubtful,
@@ -309,7 +305,7 @@ impl Judge {
 
     /// The last request has found no reply.
     fn silent(&mut self) {
-        let Some(Asked {
+        let Some(HeardRequest {
             number,
             pdu: Some(pdu),
             ..

@@ -17,7 +17,6 @@ pub(super) enum Standing {
     Named,
     /// The user names others.
     NotNamed,
-    /// Nothing shows what it is.
     Unknown,
     /// Its diagnosis has another ident number, but a master set it up as a NORDAC.
     Mistaken,
@@ -58,7 +57,7 @@ impl Standing {
 
 /// What a line shows of a slave.
 #[derive(Clone, Copy, Debug, Default)]
-struct Shown {
+struct SlaveSigns {
     /// An ident number of its diagnosis that is another one than that of a NORDAC.
     other: Option<u16>,
     /// Its diagnosis has had the ident number of a NORDAC.
@@ -69,7 +68,7 @@ struct Shown {
 
 /// The standing of all slaves of a line; `named` are those that the user names.
 pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Standing> {
-    let mut all: BTreeMap<u8, Shown> = BTreeMap::new();
+    let mut all: BTreeMap<u8, SlaveSigns> = BTreeMap::new();
     let mut asked: Option<Pdu> = None;
     for run in runs {
         let telegram = run.said().and_then(|said| said.telegram());
@@ -97,18 +96,18 @@ pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Stan
             }
         }
     }
-    let standing = |slave: u8, shown: &Shown| match (named.is_empty(), shown) {
+    let standing = |slave: u8, shown: &SlaveSigns| match (named.is_empty(), shown) {
         (false, _) if named.contains(&slave) => Standing::Named,
         (false, _) => Standing::NotNamed,
         (
             true,
-            Shown {
+            SlaveSigns {
                 is_nordac: true, ..
             },
         ) => Standing::Known,
         (
             true,
-            Shown {
+            SlaveSigns {
                 other: Some(_),
                 set_up: true,
                 ..
@@ -116,12 +115,12 @@ pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Stan
         ) => Standing::Mistaken,
         (
             true,
-            Shown {
+            SlaveSigns {
                 other: Some(ident), ..
             },
         ) => Standing::Foreign(*ident),
-        (true, Shown { set_up: true, .. }) => Standing::Known,
-        (true, Shown { .. }) => Standing::Unknown,
+        (true, SlaveSigns { set_up: true, .. }) => Standing::Known,
+        (true, SlaveSigns { .. }) => Standing::Unknown,
     };
     named
         .iter()

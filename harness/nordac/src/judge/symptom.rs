@@ -39,7 +39,6 @@ impl Symptom {
     }
 }
 
-/// What a reply is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ReplySubject {
     /// The service, and the part of its data.

@@ -41,12 +41,11 @@ const FAULT: u16 = 0x0008;
 /// What the master keeps of its slaves while a scenario is played.
 #[derive(Debug, Default)]
 pub(crate) struct KnownSlaves {
-    slaves: BTreeMap<u8, Known>,
+    slaves: BTreeMap<u8, SlaveMemory>,
 }
 
-/// What the master keeps of a slave.
 #[derive(Clone, Copy, Debug, Default)]
-struct Known {
+struct SlaveMemory {
     sequence: Sequence,
     ppo: Option<PpoType>,
     /// The words that were sent last.
@@ -118,7 +117,7 @@ fn is_off(zsw: u16) -> bool {
 }
 
 /// What is kept of a slave; as the header says, where no job has started it.
-fn known<'r>(runner: &'r mut Runner<'_, Nordac>, slave: u8) -> &'r mut Known {
+fn known<'r>(runner: &'r mut Runner<'_, Nordac>, slave: u8) -> &'r mut SlaveMemory {
     let setup = &runner.plan.setup;
     let ppo = setup.slaves.iter().find(|setup| setup.address == slave);
     let ppo = ppo.map(|setup| setup.ppo);
@@ -127,7 +126,7 @@ fn known<'r>(runner: &'r mut Runner<'_, Nordac>, slave: u8) -> &'r mut Known {
     known
 }
 
-impl Known {
+impl SlaveMemory {
     /// Puts a word into what is sent next.
     fn put(&mut self, name: WordName, word: &PlannedWord) {
         let bytes: Vec<u8> = word.iter().map(|byte| byte.unwrap_or(0)).collect();
@@ -286,9 +285,9 @@ fn start(
     ppo: PpoType,
     watchdog: Option<[u8; 2]>,
 ) -> Result<(), Stop> {
-    *known(runner, slave) = Known {
+    *known(runner, slave) = SlaveMemory {
         ppo: Some(ppo),
-        ..Known::default()
+        ..SlaveMemory::default()
     };
     let mut parameters = SetPrm::lock(IDENT);
     if let Some(factors) = watchdog {
@@ -399,13 +398,11 @@ fn on(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<(), 
 }
 
 impl PlannedParameter {
-    /// The task that reads it.
     fn read(&self) -> Pkw {
         let task = self.known.map_or(Task::Request, Task::read);
         Pkw::of(task.ak(), self.number, self.ind(), 0)
     }
 
-    /// The task that changes it.
     fn change(&self, raw: u32) -> Pkw {
         let task = self.known.map_or(Task::ChangeWord, Task::change);
         Pkw::of(task.ak(), self.number, self.ind(), raw)
@@ -481,7 +478,6 @@ fn value(span: TextSpan, parameter: &PlannedParameter, answer: Answer) -> Result
     }
 }
 
-/// A task must be refused with this error.
 fn refused(
     span: TextSpan,
     parameter: &PlannedParameter,

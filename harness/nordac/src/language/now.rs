@@ -6,9 +6,8 @@ use crate::simulate::Bench;
 use harness_bench::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
 use harness_bench::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
 
-/// Why a step was not done.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum NotNow {
+pub(crate) enum StepError {
     /// A check does not hold: what was found.
     Otherwise(String),
     /// It cannot be done at once: why.
@@ -19,15 +18,15 @@ pub(crate) enum NotNow {
 /// octet or the telegram of a fault has passed, the next one of all stations is meant.
 ///
 /// # Errors
-/// [`NotNow`].
-pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), NotNow> {
+/// [`StepError`].
+pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), StepError> {
     if step.when != PlannedWhen::Now {
-        return Err(NotNow::Refused(
+        return Err(StepError::Refused(
             "a line is carried out at once: no time is allowed in front of it",
         ));
     }
     let PlannedAction::Own(act) = &step.action else {
-        return Err(NotNow::Refused(ONLY));
+        return Err(StepError::Refused(ONLY));
     };
     match act {
         PlannedAct::Fault(placed) => {
@@ -52,12 +51,12 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), N
             let found = bench.parameter(*slave, parameter.known, parameter.index);
             let found = found.and_then(|found| parameter.known?.raw_of(found));
             let found = found.ok_or_else(|| {
-                NotNow::Otherwise(format!("slave {slave} has no {}", parameter.name()))
+                StepError::Otherwise(format!("slave {slave} has no {}", parameter.name()))
             })?;
             let compared = parameter.compare(step.span, found, *raw);
-            compared.map_err(|stop| NotNow::Otherwise(stop.into_message()))?;
+            compared.map_err(|stop| StepError::Otherwise(stop.into_message()))?;
         }
-        PlannedAct::Quiet | PlannedAct::Job(..) => return Err(NotNow::Refused(ONLY)),
+        PlannedAct::Quiet | PlannedAct::Job(..) => return Err(StepError::Refused(ONLY)),
     }
     Ok(())
 }

@@ -131,7 +131,6 @@ pub(super) fn transmit(link: &mut dyn Link, port: usize, telegrams: &[SentTelegr
     end
 }
 
-/// Whether an octet is what is wanted.
 pub(super) fn matches(wanted: &WantedOctet, octet: Received) -> bool {
     let same = match wanted.octet {
         Expected::Byte(byte) => byte == octet.byte,

@@ -11,7 +11,6 @@ use harness_sim::fault::{Flips, LinkFault};
 use harness_sim::nordac::deviation::{Deviation, MasterDeviation};
 use harness_sim::octet_segment::TelegramFault;
 
-/// The header lines of this bus.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Header {
     /// `rate 500`, in kbit/s.
@@ -22,7 +21,6 @@ pub(crate) struct Header {
     pub(crate) slaves: Vec<SlaveLine>,
 }
 
-/// A header line about a slave.
 #[derive(Clone, Debug)]
 pub(crate) struct SlaveLine {
     pub(crate) slave: Located,
@@ -48,7 +46,6 @@ pub(crate) enum SetupKind {
     Deviates(&'static Deviation),
 }
 
-/// A parameter and its index.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterName {
     pub(crate) which: Which,
@@ -68,7 +65,6 @@ pub(crate) enum Which {
     Counted(Located),
 }
 
-/// A value as written.
 #[derive(Clone, Debug)]
 pub(crate) struct WrittenValue {
     pub(crate) kind: ValueKind,
@@ -99,7 +95,6 @@ pub(crate) struct Message {
 pub(crate) struct Bad {
     /// Which octet, counted from 1.
     pub(crate) octet: Located,
-    /// What is wrong with it.
     pub(crate) how: Damage,
 }
 
@@ -145,7 +140,6 @@ pub(crate) enum Sender {
     Slave(Located),
 }
 
-/// What happens to an octet on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OctetHarm {
     /// One that says all that there is to say.
@@ -154,7 +148,6 @@ pub(crate) enum OctetHarm {
     Delay(Duration),
 }
 
-/// What happens to a telegram on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TelegramHarm {
     /// `lost`, `doubled` or `former`.
@@ -179,14 +172,12 @@ pub(crate) enum Outside {
     Restart,
 }
 
-/// A job of the master.
 #[derive(Clone, Debug)]
 pub(crate) struct JobStep {
     pub(crate) slave: Located,
     pub(crate) what: JobKind,
 }
 
-/// What a job does.
 #[derive(Clone, Debug)]
 pub(crate) enum JobKind {
     /// `start 8 ppo 1 watchdog 300ms`.
@@ -204,7 +195,7 @@ pub(crate) enum JobKind {
         expect: Vec<(WordName, WordValue)>,
     },
     /// `read 8 1202 = 5s`.
-    Read(ParameterName, Option<Wanted>),
+    Read(ParameterName, Option<WantedAnswer>),
     /// `write 8 1205.3 = 50.0Hz`, with `error 2` behind it where it must be refused.
     Write(ParameterName, WrittenValue, Option<Located>),
     /// `on 8`.
@@ -217,9 +208,8 @@ pub(crate) enum JobKind {
     Acknowledge,
 }
 
-/// What a `read` must give.
 #[derive(Clone, Debug)]
-pub(crate) enum Wanted {
+pub(crate) enum WantedAnswer {
     /// `= 5s`.
     Value(WrittenValue),
     /// `error 3`: the number of the error.
@@ -241,14 +231,12 @@ pub(crate) enum WordName {
     Pkw,
 }
 
-/// The contents of a word as written.
 #[derive(Clone, Debug)]
 pub(crate) struct WordValue {
     pub(crate) kind: WordKind,
     pub(crate) span: TextSpan,
 }
 
-/// How a word is written.
 #[derive(Clone, Debug)]
 pub(crate) enum WordKind {
     /// `047F`, `0Fxx`: hexadecimal digits, `xx` for any byte.

@@ -3,8 +3,8 @@
 use super::parse::word_name;
 use super::syntax::{
     Bad, Damage, Header, JobKind, JobStep, Message, OctetHarm, Outside, ParameterName, Sender,
-    SetupKind, TelegramHarm, TelegramStep, ValueKind, Wanted, Which, WordKind, WordName, WordValue,
-    WrittenValue,
+    SetupKind, TelegramHarm, TelegramStep, ValueKind, WantedAnswer, Which, WordKind, WordName,
+    WordValue, WrittenValue,
 };
 use harness_bench::scenario::expression::{Expression, Located};
 use harness_sim::fault::Flips;
@@ -182,8 +182,8 @@ fn job(job: &JobStep) -> String {
         JobKind::Read(name, wanted) => {
             let wanted = match wanted {
                 None => String::new(),
-                Some(Wanted::Value(wanted_value)) => format!(" = {}", value(wanted_value)),
-                Some(Wanted::Error(number)) => format!(" error {}", factor(number)),
+                Some(WantedAnswer::Value(wanted_value)) => format!(" = {}", value(wanted_value)),
+                Some(WantedAnswer::Error(number)) => format!(" error {}", factor(number)),
             };
             format!("read {slave} {}{wanted}", parameter(name))
         }

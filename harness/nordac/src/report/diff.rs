@@ -8,7 +8,6 @@ use harness_bench::counted::counted;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
 
-/// How two traces differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TraceDifference {
     /// How many telegrams each side has.

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 const WORDS: usize = 900;
 
 /// A telegram, what it means, and the later ones that are folded into it.
-struct Folded {
+struct Fold {
     said: HeardTelegram,
     words: String,
     to: Option<u8>,
@@ -37,20 +37,19 @@ pub(crate) fn sequence(html: &mut Html, id: &str, title: &str, trace: &Trace) ->
 }
 
 /// The arrows. A request and its reply are folded into those before them where both mean the same.
-fn folded(trace: &Trace) -> Vec<Folded> {
+fn folded(trace: &Trace) -> Vec<Fold> {
     let mut reader = Reader::default();
-    let mut arrows: Vec<Folded> = Vec::new();
+    let mut arrows: Vec<Fold> = Vec::new();
     for said in said(trace) {
         let words = reader.read(&said);
-        arrows.push(Folded {
+        arrows.push(Fold {
             to: words.to,
             words: format!("{}  {}", words.service, words.meaning),
             said,
             more: 0,
         });
-        let same = |one: &Folded, other: &Folded| {
-            one.said.from == other.said.from && one.words == other.words
-        };
+        let same =
+            |one: &Fold, other: &Fold| one.said.from == other.said.from && one.words == other.words;
         if let [.., first, second, third, fourth] = &mut arrows[..]
             && same(first, third)
             && same(second, fourth)
@@ -63,8 +62,7 @@ fn folded(trace: &Trace) -> Vec<Folded> {
     arrows
 }
 
-/// The arrow as it is drawn.
-fn drawn(folded: &Folded) -> Arrow {
+fn drawn(folded: &Fold) -> Arrow {
     let mut words = folded.words.clone();
     if folded.more > 0 {
         words.push_str(&format!("  and {} more like it", folded.more));

@@ -91,7 +91,6 @@ impl InverterInterlock {
         all
     }
 
-    /// The parameter, if it is on one.
     pub(crate) const fn parameter(&self) -> Option<ParameterRef> {
         match self.cell {
             Cell::Parameter(parameter) => Some(parameter),

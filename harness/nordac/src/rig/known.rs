@@ -255,7 +255,6 @@ pub(super) fn candidates(
     all
 }
 
-/// The value of a property, in words.
 pub(super) fn value_of(property: &Description, properties: &Properties) -> String {
     let holds = |word: &String| {
         let mut changed = *properties;

@@ -12,14 +12,13 @@ use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
-/// The most octets of an attempt that are kept.
 const MOST_KEPT: usize = 1_000_000;
 
 /// A link to inverters, observed.
 pub(super) type Observed<'l> = harness_bench::rig::playing::observed::Observed<'l, TelegramNotes>;
 
 /// A parameter that may have been written: station, number and IND.
-pub(super) type Written = (u8, u16, u16);
+pub(super) type WrittenParameter = (u8, u16, u16);
 
 /// A telegram of the bench, and what came behind it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,12 +38,11 @@ pub(super) struct Turn {
 pub(super) struct TelegramNotes {
     /// The telegrams since the last [`begin_fresh`](Self::begin_fresh), in one time.
     pub(super) turns: Vec<Turn>,
-    /// The present step of the scenario.
     step: Option<usize>,
     /// How long the conversations before this one took since then, and how long this one has.
     took: [Span; 2],
     /// The parameters that telegrams may have written.
-    pub(super) written: BTreeSet<Written>,
+    pub(super) written: BTreeSet<WrittenParameter>,
     /// The addresses that telegrams may have given to stations: the station, and its new one.
     pub(super) moved: BTreeSet<(u8, u8)>,
     /// When the last telegram had left.
@@ -56,7 +54,7 @@ pub(super) struct TelegramNotes {
     /// How many octets were received, and their checksum.
     heard: ReceivedSum,
     /// The octets that were received.
-    kept: Vec<CameOctet>,
+    kept: Vec<ReceivedOctet>,
     /// How often something was sent since the last [`begin_fresh`](Self::begin_fresh).
     sent: u32,
     /// When the last octet came or the last telegram had left, in this conversation.
@@ -64,14 +62,14 @@ pub(super) struct TelegramNotes {
     /// How many octets had come at the last [`begin_fresh`](Self::begin_fresh).
     pub(super) fresh: usize,
     /// What others sent in the place of what counts here.
-    expected: Option<Expected>,
+    expected: Option<ExpectedOctets>,
     /// That something else came.
     differs: Option<Trouble>,
 }
 
 /// Octets with which those of a model are compared as they come.
-struct Expected {
-    came: Came,
+struct ExpectedOctets {
+    came: ReceivedOctets,
     /// How many octets came before them.
     behind: usize,
     /// Whether their times count.
@@ -80,7 +78,7 @@ struct Expected {
 
 /// An octet from a slave, and its place in the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct CameOctet {
+struct ReceivedOctet {
     /// How often something was sent before it: an answer to one request is none to another.
     sent: u32,
     /// How long after the octet before, or after what was sent last.
@@ -89,7 +87,7 @@ struct CameOctet {
     bits: u16,
 }
 
-impl CameOctet {
+impl ReceivedOctet {
     /// The same octet, whenever it came.
     const fn at_any_time(self) -> Self {
         Self {
@@ -102,7 +100,7 @@ impl CameOctet {
 
 /// Octets from the slaves, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Came(Vec<CameOctet>);
+pub(super) struct ReceivedOctets(Vec<ReceivedOctet>);
 
 /// How far two sequences of octets agree; the more the greater. [`WHOLE`] where they are the same.
 pub(super) type Agreement = usize;
@@ -110,7 +108,7 @@ pub(super) type Agreement = usize;
 /// All octets agree.
 pub(super) const WHOLE: Agreement = Agreement::MAX;
 
-impl Came {
+impl ReceivedOctets {
     /// The same octets, whenever they came.
     pub(super) fn at_any_time(mut self) -> Self {
         let octets = self.0.iter_mut();
@@ -132,7 +130,6 @@ impl Came {
         same * 32 + bits
     }
 
-    /// The telegrams among the octets.
     pub(super) fn telegrams(&self) -> Vec<Telegram> {
         let octets: Vec<u8> = self.0.iter().map(|octet| octet.bits as u8).collect();
         let mut rest = octets.as_slice();
@@ -160,14 +157,13 @@ impl TelegramNotes {
         self.step = None;
     }
 
-    /// This time is reached.
     pub(super) fn reach(&mut self, now: Instant) {
         self.took[1] = self.took[1].max(now.since_start());
     }
 
     /// The link ends with the first octet behind the first `behind` ones that is not that of `came`: how far they agree is known then.
-    pub(super) fn expect(&mut self, came: &Came, behind: usize, timed: bool) {
-        self.expected = Some(Expected {
+    pub(super) fn expect(&mut self, came: &ReceivedOctets, behind: usize, timed: bool) {
+        self.expected = Some(ExpectedOctets {
             came: came.clone(),
             behind,
             timed,
@@ -197,13 +193,13 @@ impl TelegramNotes {
     }
 
     /// The octets that came since the last [`begin_fresh`](Self::begin_fresh).
-    pub(super) fn came(&self) -> Came {
-        Came(self.kept[self.fresh..].to_vec())
+    pub(super) fn came(&self) -> ReceivedOctets {
+        ReceivedOctets(self.kept[self.fresh..].to_vec())
     }
 
     /// All octets that came.
-    pub(super) fn all(&self) -> Came {
-        Came(self.kept.clone())
+    pub(super) fn all(&self) -> ReceivedOctets {
+        ReceivedOctets(self.kept.clone())
     }
 
     /// What was received so far, in words.
@@ -273,7 +269,7 @@ impl LinkNotes for TelegramNotes {
                 .last
                 .replace(at)
                 .map_or(Span::ZERO, |last| at.since(last));
-            self.kept.push(CameOctet {
+            self.kept.push(ReceivedOctet {
                 sent: self.sent,
                 gap,
                 bits: u16::from(octet.byte) | error,
@@ -320,7 +316,7 @@ impl LinkNotes for TelegramNotes {
 
 #[cfg(test)]
 mod tests {
-    use super::{Came, TelegramNotes, WHOLE};
+    use super::{ReceivedOctets, TelegramNotes, WHOLE};
     use harness_bench::medium::{Heard, Medium};
     use harness_bench::rig::playing::observed::LinkNotes;
     use harness_proto::line::Received;
@@ -329,7 +325,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// Notes octets at their times in ms, until the link ends.
-    fn noted(octets: &[(u64, u8)], expected: Option<(&Came, bool)>) -> TelegramNotes {
+    fn noted(octets: &[(u64, u8)], expected: Option<(&ReceivedOctets, bool)>) -> TelegramNotes {
         let mut notes = TelegramNotes::default();
         if let Some((came, timed)) = expected {
             notes.expect(came, 0, timed);

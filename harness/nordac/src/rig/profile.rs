@@ -15,9 +15,9 @@ use harness_proto::nordac::properties::{Description, Properties};
 
 /// The properties of slaves that a profile says: the address of the slave, the property and its value.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Profiled(Vec<(u8, &'static Description, String)>);
+pub(super) struct ProfileSettings(Vec<(u8, &'static Description, String)>);
 
-impl Profiled {
+impl ProfileSettings {
     /// Those of a rig; none where its file names no profile.
     pub(super) fn of(rig: &Rig) -> Self {
         let Some(profile) = &rig.profile else {
@@ -89,7 +89,7 @@ mod tests {
             let mut open = fresh.open.iter();
             let word = open.find_map(|(words, _)| words.strip_prefix(&named));
             let word = word.expect("another value").to_owned();
-            let profile = Profiled(vec![(8, property, word.clone())]);
+            let profile = ProfileSettings(vec![(8, property, word.clone())]);
             let mut known = fresh.clone();
             profile.settle(&mut known).expect("possible");
             assert_ne!(known.properties, fresh.properties, "{named}{word}");

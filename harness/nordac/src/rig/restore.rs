@@ -5,8 +5,8 @@
 
 use super::RigSlave;
 use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
-use super::observed::Written;
-use super::player::{Begun, Player, idle};
+use super::observed::WrittenParameter;
+use super::player::{PlayableScenario, Player, idle};
 use super::talk::{Talk, TalkError};
 use crate::gate::GuardsSlaves as _;
 use crate::safe_state::{found, last_words};
@@ -73,7 +73,7 @@ impl Player {
                 }
             };
             drop(talk);
-            let mut back = Back::new(line, self, known, slave);
+            let mut back = Restoration::new(line, self, known, slave);
             // Terminals that control it again do not let the bus acknowledge.
             let mut fault = back.without_fault(self);
             let left = back.all(&changed);
@@ -81,7 +81,7 @@ impl Player {
             drop(back);
             line.reset_after_denial();
             if !changed.is_empty() || fault.is_err() {
-                fault = Back::new(line, self, known, slave).without_fault(self);
+                fault = Restoration::new(line, self, known, slave).without_fault(self);
             }
             if let Some((kept, why)) = left {
                 let commands = commands(known, slave, &kept, origin);
@@ -96,7 +96,7 @@ impl Player {
 
     /// Says what a scenario is about to write, and which addresses it gives to slaves, with what puts it back. A slave is stopped where it may be
     /// then, with the PPO type that it may have.
-    pub(super) fn foretell(&self, begun: &Begun) {
+    pub(super) fn foretell(&self, begun: &PlayableScenario) {
         let writes = |known: &Known| {
             let slave = known.slave;
             let changed = changed(known, &[slave.address], &begun.written);
@@ -125,7 +125,7 @@ impl Player {
 }
 
 /// Whether a scenario may give a slave another PPO type.
-fn may_switch(known: &Known, begun: &Begun) -> bool {
+fn may_switch(known: &Known, begun: &PlayableScenario) -> bool {
     let address = known.slave.address;
     let moved = begun.moved.iter().filter(|change| change.0 == address);
     let places: Vec<_> = moved.map(|change| change.1).chain([address]).collect();
@@ -134,7 +134,7 @@ fn may_switch(known: &Known, begun: &Begun) -> bool {
 }
 
 /// What may have been `written` to a slave that was at these addresses, in the order in which it is put back.
-fn changed(known: &Known, places: &[u8], written: &BTreeSet<Written>) -> Vec<Place> {
+fn changed(known: &Known, places: &[u8], written: &BTreeSet<WrittenParameter>) -> Vec<Place> {
     let written: Vec<_> = written
         .iter()
         .filter(|write| places.contains(&write.0))
@@ -179,14 +179,14 @@ fn commands(known: &Known, at: RigSlave, places: &[Place], origin: &str) -> Stri
 }
 
 /// A slave that is put back.
-struct Back<'k, 'l> {
+struct Restoration<'k, 'l> {
     talk: Talk<'l>,
     known: &'k Known,
     /// Where it is, and its PPO type there.
     slave: RigSlave,
 }
 
-impl<'k, 'l> Back<'k, 'l> {
+impl<'k, 'l> Restoration<'k, 'l> {
     fn new<L: Line>(
         line: &'l mut Guarded<L>,
         player: &Player,

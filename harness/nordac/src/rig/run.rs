@@ -1,7 +1,7 @@
 //! NORDAC inverters on which scenarios are played: what their player offers, and what is set back behind a scenario.
 
 use super::player::{Own, Player};
-use super::profile::Profiled;
+use super::profile::ProfileSettings;
 use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
 use super::{Session, limits, rate, setup, slaves};
@@ -42,7 +42,7 @@ impl PortPlayer for Player {
         if qualifies {
             player.qualify();
         } else {
-            player.profile = Profiled::of(rig);
+            player.profile = ProfileSettings::of(rig);
         }
         player
     }

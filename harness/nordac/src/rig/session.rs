@@ -3,7 +3,7 @@
 use super::interlock::InverterInterlocks;
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
-use crate::cli::Parked;
+use crate::cli::ParkedDriver;
 use crate::gate::guarded;
 use crate::safe_state::{last_words, safe_state};
 use crate::simulate::Bench;
@@ -28,7 +28,7 @@ pub(crate) struct Inverters {
     slaves: Vec<RigSlave>,
     patience: Span,
     /// The master, between two requests of a session.
-    pub(crate) parked: Parked,
+    pub(crate) parked: ParkedDriver,
 }
 
 /// A rig in use.
@@ -49,7 +49,7 @@ impl PortDrives for Inverters {
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &known, port.listen_only);
         let patience = patience_of(rig, port);
-        let parked = Parked::default();
+        let parked = ParkedDriver::default();
         Ok((
             Self {
                 slaves,

@@ -134,16 +134,16 @@ fn image(word: u16) -> Image {
 }
 
 /// The properties that explain what slaves did, slave by slave.
-pub(super) type Assumed = Vec<Properties>;
+pub(super) type Assumptions = Vec<Properties>;
 
 /// Looks for properties that explain what slaves did: from `base` on, one point after the other that `may` differ of a slave is changed as long
 /// as that explains more, and two at once where no single one does. All that were found to explain everything, each with the words of its last
 /// difference; none if there are no such.
 pub(super) fn search(
-    base: &Assumed,
+    base: &Assumptions,
     may: impl Fn(usize, &Description) -> bool,
-    mut explains: impl FnMut(&Assumed) -> Agreement,
-) -> Vec<(String, Assumed)> {
+    mut explains: impl FnMut(&Assumptions) -> Agreement,
+) -> Vec<(String, Assumptions)> {
     let mut so_far = (explains(base), base.clone());
     if so_far.0 == WHOLE {
         return vec![(String::new(), base.clone())];
@@ -188,12 +188,12 @@ pub(super) fn search(
 struct Step {
     agreed: Agreement,
     words: String,
-    slaves: Assumed,
+    slaves: Assumptions,
 }
 
 fn judged(
-    all: Vec<(String, Assumed)>,
-    explains: &mut impl FnMut(&Assumed) -> Agreement,
+    all: Vec<(String, Assumptions)>,
+    explains: &mut impl FnMut(&Assumptions) -> Agreement,
 ) -> Vec<Step> {
     let all = all.into_iter().map(|(words, slaves)| Step {
         agreed: explains(&slaves),
@@ -217,7 +217,10 @@ fn name_of(words: &str) -> &str {
 }
 
 /// What differs in one point from these slaves.
-fn steps(from: &Assumed, may: impl Fn(usize, &Description) -> bool) -> Vec<(String, Assumed)> {
+fn steps(
+    from: &Assumptions,
+    may: impl Fn(usize, &Description) -> bool,
+) -> Vec<(String, Assumptions)> {
     let of = |place: usize| {
         let near = candidates(from[place], |property| may(place, property));
         near.into_iter().map(move |(words, properties)| {
@@ -248,17 +251,17 @@ pub(super) fn settle(
 #[cfg(test)]
 mod tests {
     use super::super::known::value_of;
-    use super::{Assumed, WHOLE, search};
+    use super::{Assumptions, WHOLE, search};
     use harness_proto::nordac::properties::{Description, PROPERTIES, Properties};
 
     /// What a slave does may follow from two points together, of which neither alone explains more than the default.
     #[test]
     fn two_points_are_changed_at_once() {
-        let holds = |all: &Assumed, name: &str, value: &str| {
+        let holds = |all: &Assumptions, name: &str, value: &str| {
             let mut named = PROPERTIES.iter().filter(|property| property.name == name);
             named.any(|property| value_of(property, &all[0]) == value)
         };
-        let explains = |all: &Assumed| match (
+        let explains = |all: &Assumptions| match (
             holds(all, "subindex-bits", "7..15"),
             holds(all, "plain-task-subindex", "ignored"),
         ) {

@@ -22,7 +22,6 @@ const PATIENCE: Span = Span::from_millis(5_000);
 /// Behind the last step: what is late arrives, and what was not stopped shows.
 const REST: Span = Span::from_millis(300);
 
-/// What a step brought.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum JobEnd {
     /// The outcome of a job; the stuff byte of a reply is left out.

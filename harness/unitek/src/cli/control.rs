@@ -1,7 +1,7 @@
 //! `drivebench go`, `stop`, `block` and `delete-error` on UNITEK drives.
 
 use super::write::{Order, refuse_denied};
-use crate::driver::{Driver, Error, Stopped};
+use crate::driver::{Driver, Error, StopKind};
 use crate::rig::OfUnitek as _;
 use crate::rig::{Axis, Session, UnitekDrives};
 use harness_bench::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
@@ -82,10 +82,10 @@ pub(super) fn stop(
     })
 }
 
-pub(super) const fn how(stopped: Stopped) -> &'static str {
+pub(super) const fn how(stopped: StopKind) -> &'static str {
     match stopped {
-        Stopped::OnRamp => "its speed command is 0",
-        Stopped::Locked => "it is locked and coasts: the rig's file permits no speed command",
+        StopKind::OnRamp => "its speed command is 0",
+        StopKind::Locked => "it is locked and coasts: the rig's file permits no speed command",
     }
 }
 

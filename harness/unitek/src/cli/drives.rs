@@ -3,7 +3,7 @@
 use super::bench::scaling;
 use super::info::{info, top};
 use super::params::{PARAMETERS, RegisterValue};
-use super::read::Found;
+use super::read::RegisterReading;
 use crate::rig::{Axis, OfUnitek as _, Session, UnitekDrives};
 use crate::value::registers;
 use harness_bench::command::check::{CheckAnswer, CheckedDrive};
@@ -20,7 +20,7 @@ use serde_json::json;
 
 impl CommandDrives for UnitekDrives {
     type Cell = &'static Register;
-    type Reading = Found;
+    type Reading = RegisterReading;
     type Parameter = RegisterValue;
 
     const PARAMETERS: ParameterFile<Self, RegisterValue> = PARAMETERS;
@@ -35,7 +35,7 @@ impl CommandDrives for UnitekDrives {
         session: &mut Session,
         drives: &[Axis],
         registers: &[Self::Cell],
-    ) -> Result<Vec<Found>, Failure> {
+    ) -> Result<Vec<RegisterReading>, Failure> {
         let mut driver = session.driver();
         let mut found = Vec::new();
         for &axis in drives {
@@ -46,7 +46,7 @@ impl CommandDrives for UnitekDrives {
             };
             for register in registers {
                 let reply = driver.read(axis, register.number)?;
-                found.push(Found {
+                found.push(RegisterReading {
                     axis,
                     reply,
                     scaling,

@@ -1,7 +1,7 @@
 //! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
 
 use super::control::how;
-use super::read::Found;
+use super::read::RegisterReading;
 use crate::live;
 use crate::rig::{Axis, OfUnitek as _, Session, UnitekDrives};
 use crate::value::hex;
@@ -59,7 +59,7 @@ static FORM: TopForm = TopForm {
 pub(super) fn info(session: &mut Session, drives: &[Axis]) -> Result<Vec<DriveInfo>, Failure> {
     let registers = SHOWN.map(|(_, register)| Register::of(register));
     let found = UnitekDrives::read(session, drives, &registers)?;
-    let row = |(found, (name, register)): (&Found, (&str, u8))| {
+    let row = |(found, (name, register)): (&RegisterReading, (&str, u8))| {
         let place = format!("{register:02X} {}", found.register().name);
         [name.to_owned(), words(found), place]
     };
@@ -93,7 +93,7 @@ pub(super) fn top(session: &Session) -> LineTop<UnitekDrives> {
 }
 
 /// The row of a drive of which the registers of `top` were read.
-fn row(found: &[Found]) -> TopRow {
+fn row(found: &[RegisterReading]) -> TopRow {
     let raw = |register: u8| {
         let found_register = found.iter().find(|found| found.reply.register == register);
         found_register.map_or(0, |found| found.reply.data.bits())
@@ -124,7 +124,7 @@ fn row(found: &[Found]) -> TopRow {
 }
 
 /// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.
-fn words(found: &Found) -> String {
+fn words(found: &RegisterReading) -> String {
     let raw = found.reply.data.bits();
     match found.reply.register {
         0x1B | 0x62 | 0xEB => found.reply.number().to_string(),

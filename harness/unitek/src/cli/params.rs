@@ -6,7 +6,7 @@
 //! 0xC8 = "0E10"     # SPEED_RPMMAX  3600 rpm
 //! ```
 
-use super::read::Found;
+use super::read::RegisterReading;
 use super::write::{Order, refuse_denied};
 use crate::rig::OfUnitek as _;
 use crate::rig::{Axis, Session, UnitekDrives};
@@ -48,12 +48,12 @@ pub(super) const PARAMETERS: ParameterFile<UnitekDrives, RegisterValue> = Parame
 };
 
 /// The parameters of a drive, read.
-fn parameters(session: &mut Session, axis: Axis) -> Result<Vec<Found>, Failure> {
+fn parameters(session: &mut Session, axis: Axis) -> Result<Vec<RegisterReading>, Failure> {
     let all: Vec<_> = REGISTERS.iter().filter(|row| is_parameter(row)).collect();
     UnitekDrives::read(session, &[axis], &all)
 }
 
-fn line(found: &Found) -> String {
+fn line(found: &RegisterReading) -> String {
     let register = found.register();
     let value = format!("\"{}\"", hex(found.reply.data));
     format!(
@@ -65,7 +65,7 @@ fn line(found: &Found) -> String {
 }
 
 /// The registers that read differently from a file.
-fn differing(wanted: &[RegisterValue], found: &[Found]) -> Vec<(RegisterValue, String)> {
+fn differing(wanted: &[RegisterValue], found: &[RegisterReading]) -> Vec<(RegisterValue, String)> {
     let of = |&(register, wanted): &RegisterValue| {
         let found = found
             .iter()

@@ -11,13 +11,13 @@ use harness_proto::unitek::{Data, Register};
 use serde_json::{Value, json};
 
 /// What was read of a register.
-pub(crate) struct Found {
+pub(crate) struct RegisterReading {
     pub(super) axis: Axis,
     pub(super) reply: Reply,
     pub(super) scaling: Scaling,
 }
 
-impl Found {
+impl RegisterReading {
     pub(super) fn register(&self) -> &'static Register {
         Register::of(self.reply.register)
     }
@@ -27,7 +27,7 @@ impl Found {
     }
 }
 
-impl CellReading for Found {
+impl CellReading for RegisterReading {
     const COLUMNS: &'static [&'static str] =
         &["drive", "reg", "name", "raw", "value", "origin", "label"];
     const LIST: &'static str = "registers";

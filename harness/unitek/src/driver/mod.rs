@@ -18,7 +18,6 @@ use harness_proto::unitek::words::MODE_LOCK;
 use std::collections::VecDeque;
 use std::fmt;
 
-/// Most events that wait to be fetched.
 const MOST_EVENTS: usize = 4096;
 
 /// How long a start-up waits for ready, and for the hardware enable (ex 11).
@@ -40,7 +39,7 @@ const COMMANDS: [u8; 2] = [0x31, 0x90];
 const MODE: u8 = 0x51;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stopped {
+pub(crate) enum StopKind {
     /// Its speed command is 0: it stops on its ramp.
     OnRamp,
     /// It is locked, and its commands are 0: it coasts. The rig's file does not permit a speed command.
@@ -102,12 +101,10 @@ impl<'l> Driver<'l> {
         Self { silence, ..self }
     }
 
-    /// Its drives.
     pub(crate) fn axes(&self) -> impl Iterator<Item = Axis> {
         self.drives.iter().map(|drive| drive.axis)
     }
 
-    /// The time of its line.
     #[must_use]
     pub(crate) fn now(&self) -> Instant {
         self.line.now()
@@ -166,13 +163,13 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// See [`Self::write`].
-    pub(crate) fn stop(&mut self, axis: Axis) -> Result<Stopped, Error> {
+    pub(crate) fn stop(&mut self, axis: Axis) -> Result<StopKind, Error> {
         if self.permits_write(axis, COMMANDS[0], 0) {
             self.write(axis, COMMANDS[0], Data::Short(0))?;
-            Ok(Stopped::OnRamp)
+            Ok(StopKind::OnRamp)
         } else {
             self.lock(axis)?;
-            Ok(Stopped::Locked)
+            Ok(StopKind::Locked)
         }
     }
 

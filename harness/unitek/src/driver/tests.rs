@@ -110,7 +110,7 @@ fn release_stop_and_lock() {
         driver.read(axis(1), 0x30).expect("a reply").data,
         Data::Short(0)
     );
-    assert_eq!(driver.stop(axis(1)), Ok(Stopped::OnRamp));
+    assert_eq!(driver.stop(axis(1)), Ok(StopKind::OnRamp));
     assert_eq!(
         driver.read(axis(1), 0x51).expect("a reply").data,
         Data::Short(0)
@@ -127,7 +127,7 @@ fn release_stop_and_lock() {
 fn a_stop_without_permission_locks() {
     let mut line = line(&released(), Limits::default());
     let mut driver = driver(&mut line);
-    assert_eq!(driver.stop(axis(1)), Ok(Stopped::Locked));
+    assert_eq!(driver.stop(axis(1)), Ok(StopKind::Locked));
     assert_eq!(
         driver.read(axis(1), 0x51).expect("a reply").data,
         Data::Short(4)

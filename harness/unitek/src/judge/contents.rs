@@ -1,7 +1,7 @@
 //! What the frames of a drive hold: how long they must be, and what a register can read.
 
-use super::follower::{Asked, Follower, Homing};
-use super::held::{Held, is_live, takes_writes};
+use super::follower::{Follower, Homing, PendingRequest};
+use super::held::{Contents, is_live, takes_writes};
 use super::symptom::FrameSymptom::{Length, Value};
 use harness_proto::time::Instant;
 use harness_proto::unitek::frame::Reply;
@@ -46,10 +46,10 @@ impl Follower {
     }
 
     /// Whether a register can read this.
-    pub(super) fn value(&mut self, number: usize, reply: &Reply, asked: Option<&Asked>) {
+    pub(super) fn value(&mut self, number: usize, reply: &Reply, asked: Option<&PendingRequest>) {
         let register = Register::of(reply.register);
         let raw = reply.data.bits();
-        let locks = |held: &Held| {
+        let locks = |held: &Contents| {
             let mode = held.sure();
             mode.is_some_and(|mode| mode & u32::from(MODE_LOCK) != 0)
         };
@@ -87,7 +87,7 @@ impl Follower {
         }
         let held = self.held[place].clone();
         if takes_writes(register) {
-            self.judged.values += usize::from(held != Held::any());
+            self.judged.values += usize::from(held != Contents::any());
             if held.sure() == Some(raw & mask) {
                 self.supply.kept(reply.register, raw & mask);
             }
@@ -113,7 +113,7 @@ impl Follower {
             self.wide = Some(raw & 0x0100 != 0);
         }
         if whole && asked.held == held {
-            self.held[place] = Held::one(raw & mask);
+            self.held[place] = Contents::one(raw & mask);
             self.may_use(reply.register, raw);
         }
     }

@@ -9,7 +9,6 @@ use harness_proto::time::Span;
 use harness_sim::record::{LineFrame, Seam, SeamKind};
 use std::collections::BTreeSet;
 
-/// Differences and doubts that are kept at most.
 pub(super) const MOST_BREACHES: usize = 50;
 
 /// Something that a drive does, and that no value of what the manual leaves open explains.
@@ -26,7 +25,6 @@ pub(crate) struct Breach {
     pub(crate) about: String,
 }
 
-/// What came of judging frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct JudgedDrives {
     /// What differs, in order.
@@ -46,7 +44,6 @@ pub(crate) struct JudgedDrives {
 }
 
 impl JudgedDrives {
-    /// Notes what accuses no drive.
     pub(super) fn doubt(&mut self, about: String) {
         if self.doubts.len() < MOST_BREACHES {
             self.doubts.push(about);
@@ -196,7 +193,6 @@ fn judge_with(
     all
 }
 
-/// Identifiers that are shown at most.
 const MOST_SHOWN: usize = 8;
 
 /// How many frames are neither to nor from one of the drives, and with which identifiers.

@@ -3,7 +3,7 @@
 use super::cycle::{Cycle, Running};
 use super::drives::{Breach, JudgedDrives, MOST_BREACHES};
 use super::elsewhere::Elsewhere;
-use super::held::{Held, is_live, takes_writes};
+use super::held::{Contents, is_live, takes_writes};
 use super::supply::Supply;
 use super::symptom::FrameSymptom::{self, Length, Missing, Name};
 use crate::language::{identifier, written};
@@ -29,9 +29,8 @@ const MOST_ASKED: usize = 1_000;
 /// The longest interval of a cycle, and some more.
 pub(super) const LONGEST_CYCLE: Span = Span::from_millis(300);
 
-/// A request that waits for its reply.
 #[derive(Clone, Debug)]
-pub(super) struct Asked {
+pub(super) struct PendingRequest {
     pub(super) register: u8,
     pub(super) at: Instant,
     pub(super) frame: usize,
@@ -40,7 +39,7 @@ pub(super) struct Asked {
     /// The same, and a gap of the log followed it.
     pub(super) excused: bool,
     /// What the register could hold since the request: a drive may read it at any time until it replies.
-    pub(super) held: Held,
+    pub(super) held: Contents,
 }
 
 /// Whether homing may run (ex 12).
@@ -66,11 +65,11 @@ pub(crate) struct Follower {
     pub(super) second: [Vec<u16>; 2],
     /// 73 was written: it may use another bit rate than the bus, at once or from its next start on (`rate-change`).
     pub(super) other_rate: bool,
-    pub(super) held: Vec<Held>,
+    pub(super) held: Vec<Contents>,
     pub(super) cycles: [Cycle; 256],
-    pub(super) asked: VecDeque<Asked>,
+    pub(super) asked: VecDeque<PendingRequest>,
     /// Contents that a reply under way may have, by register: a frame of a cycle or an event came behind its request, and may not have been it.
-    pub(super) loose: BTreeMap<u8, (Instant, Held)>,
+    pub(super) loose: BTreeMap<u8, (Instant, Contents)>,
     /// The latest of all replies, behind its request.
     pub(super) slowest: Option<Span>,
     /// Whether replies with 8F are short, once it is known (`map-reply`).
@@ -86,7 +85,6 @@ pub(crate) struct Follower {
     pub(super) homes: Homing,
     /// What hosts have sent on other identifiers.
     pub(super) elsewhere: Elsewhere,
-    /// When the first frame began.
     pub(super) begin: Option<Instant>,
     /// When the first frame behind the last gap of the log began.
     pub(super) gap: Option<Instant>,
@@ -94,7 +92,6 @@ pub(crate) struct Follower {
     pub(super) unsolicited: BTreeMap<u8, Instant>,
     /// What was written to registers that cannot be written, and held something else.
     pub(super) refused: BTreeMap<u8, u32>,
-    /// The numbers of the other drives.
     pub(super) others: Vec<u8>,
     /// Whether its identifiers are guessed from what it sends: it may receive on another one, and change both at its next start (`id-change`).
     pub(super) guessed: bool,
@@ -117,9 +114,9 @@ impl Follower {
     /// A drive of which nothing is known but its identifiers.
     #[must_use]
     pub(crate) fn new(drive: u8, (rx, tx): (u16, u16)) -> Self {
-        let mut held = vec![Held::any(); REGISTERS.len()];
-        held[0x68] = Held::one(rx.into());
-        held[0x69] = Held::one(tx.into());
+        let mut held = vec![Contents::any(); REGISTERS.len()];
+        held[0x68] = Contents::one(rx.into());
+        held[0x69] = Contents::one(tx.into());
         Self {
             drive,
             rx: vec![rx],
@@ -159,7 +156,7 @@ impl Follower {
     pub(crate) fn guessed(drive: u8, identifiers: (u16, u16)) -> Self {
         Self {
             guessed: true,
-            held: vec![Held::any(); REGISTERS.len()],
+            held: vec![Contents::any(); REGISTERS.len()],
             ..Self::new(drive, identifiers)
         }
     }
@@ -272,7 +269,6 @@ impl Follower {
         self.judged
     }
 
-    /// Whether something asks the drive for a frame.
     fn is_asked(&self) -> bool {
         let cycles = &self.cycles;
         !self.asked.is_empty() || cycles.iter().any(|cycle| matches!(cycle, Cycle::On(_)))
@@ -366,7 +362,7 @@ impl Follower {
         {
             held = held.or(other);
         }
-        self.asked.push_back(Asked {
+        self.asked.push_back(PendingRequest {
             register,
             at,
             frame,
@@ -377,7 +373,7 @@ impl Follower {
     }
 
     /// A frame of a cycle or an event has come in place of the reply to this request, which may be under way still.
-    pub(super) fn may_come_later(&mut self, asked: &Asked, at: Instant) {
+    pub(super) fn may_come_later(&mut self, asked: &PendingRequest, at: Instant) {
         let held = self.held[usize::from(shown_in(asked.register))].or(&asked.held);
         let later = self.asked.iter_mut();
         for other in later.filter(|other| other.register == asked.register) {
@@ -421,7 +417,7 @@ impl Follower {
             0x83 => {
                 self.supply.stored();
                 for other in REGISTERS.iter().filter(|row| row.access == Access::RW) {
-                    self.held[usize::from(other.number)] = Held::any();
+                    self.held[usize::from(other.number)] = Contents::any();
                 }
                 (self.wide, self.wide_at) = (None, at);
             }

@@ -1,7 +1,7 @@
 //! Gaps of a log: what was due in one accuses no drive, and what never comes behind them does.
 
 use super::cycle::Cycle;
-use super::follower::{Asked, Follower, Homing};
+use super::follower::{Follower, Homing, PendingRequest};
 use super::symptom::FrameSymptom::Missing;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Register;
@@ -57,7 +57,7 @@ impl Follower {
     }
 
     /// A request has found no reply.
-    pub(super) fn unanswered(&mut self, asked: &Asked) {
+    pub(super) fn unanswered(&mut self, asked: &PendingRequest) {
         let register = asked.register;
         let name = Register::of(register).name;
         let about = format!("the request for register {register:02X} ({name}) is not answered");

@@ -10,7 +10,7 @@ type Bits = (u32, u32);
 
 /// What a register can hold; `None` where it can be anything.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Held(Option<Vec<Bits>>);
+pub(super) struct Contents(Option<Vec<Bits>>);
 
 /// Registers that show the plant, inputs or sensors, or that a drive changes by itself (UNITEK 8, dump): they are not compared.
 const LIVE: [u8; 54] = [
@@ -27,7 +27,7 @@ pub(super) fn is_live(number: u8) -> bool {
     logic || LIVE.contains(&number)
 }
 
-impl Held {
+impl Contents {
     pub(super) fn one(raw: u32) -> Self {
         Self(Some(vec![(raw, u32::MAX)]))
     }

@@ -1,7 +1,7 @@
 //! Why a drive sends a frame: a request, a cycle, an event.
 
 use super::cycle::{Cycle, Untimely};
-use super::follower::{Asked, Follower, LONGEST_CYCLE};
+use super::follower::{Follower, LONGEST_CYCLE, PendingRequest};
 use super::symptom::FrameSymptom::{Time, Unasked};
 use crate::language::written;
 use harness_proto::time::Instant;
@@ -12,7 +12,12 @@ use harness_sim::record::LineFrame;
 
 impl Follower {
     /// Why the drive sends it: the request that it answers, if it is one. What nothing asks for differs.
-    pub(super) fn why(&mut self, number: usize, frame: &LineFrame, reply: &Reply) -> Option<Asked> {
+    pub(super) fn why(
+        &mut self,
+        number: usize,
+        frame: &LineFrame,
+        reply: &Reply,
+    ) -> Option<PendingRequest> {
         let register = reply.register;
         let used = self.used;
         let place = self.answered(register);

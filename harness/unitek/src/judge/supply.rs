@@ -3,7 +3,7 @@
 
 use super::cycle::Cycle;
 use super::follower::Follower;
-use super::held::Held;
+use super::held::Contents;
 use super::symptom::FrameSymptom::Missing;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
@@ -97,7 +97,7 @@ impl Follower {
             return Self::new(self.drive, (0, 0));
         };
         let mut follower = Self::new(self.drive, (*rx, *tx));
-        follower.held.fill(Held::any());
+        follower.held.fill(Contents::any());
         let late = |written: &Instant| at.since(*written) + self.tolerance < RESTART;
         let written = self.supply.written.iter();
         let written = written.map(|(register, (_, at))| (*register, *at));
@@ -119,7 +119,7 @@ impl Follower {
             (asked.sure, asked.excused) = (false, false);
             let written = kept.get(&asked.register);
             if written.is_none_or(|written| *written > asked.at) {
-                asked.held = Held::any();
+                asked.held = Contents::any();
             }
         }
         (follower.slowest, follower.short_map) = (self.slowest, self.short_map);

@@ -9,9 +9,8 @@ use harness_bench::link::{DriveFault, Link, Moment, PlacedFault};
 use harness_bench::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
 use harness_sim::unitek::Stimulus;
 
-/// Why a step was not done.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum NotNow {
+pub(crate) enum StepError {
     /// A check does not hold: what was found.
     Otherwise(String),
     /// It cannot be done at once: why.
@@ -22,15 +21,15 @@ pub(crate) enum NotNow {
 /// If the frame of a fault has passed, the next one is meant.
 ///
 /// # Errors
-/// [`NotNow`].
-pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Unitek>) -> Result<(), NotNow> {
+/// [`StepError`].
+pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Unitek>) -> Result<(), StepError> {
     if step.when != PlannedWhen::Now {
-        return Err(NotNow::Refused(
+        return Err(StepError::Refused(
             "a line is carried out at once: no time is allowed in front of it",
         ));
     }
     let PlannedAction::Own(act) = &step.action else {
-        return Err(NotNow::Refused(ONLY));
+        return Err(StepError::Refused(ONLY));
     };
     match act {
         Act::Frame(number, fault) => {
@@ -43,12 +42,12 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Unitek>) -> Result<(), N
         Act::Harm(node, DriveHarm::BusOff) => outside(bench, *node, Stimulus::BusOff),
         Act::Outside(node, stimulus) => outside(bench, *node, *stimulus),
         Act::Register(node, wanted) => {
-            let drive = bench.drive(*node).ok_or(NotNow::Refused(ONLY))?;
+            let drive = bench.drive(*node).ok_or(StepError::Refused(ONLY))?;
             let compared = wanted.compare(step.span, drive.register(wanted.register));
-            compared.map_err(|stop| NotNow::Otherwise(stop.into_message()))?;
+            compared.map_err(|stop| StepError::Otherwise(stop.into_message()))?;
         }
         Act::Quiet | Act::Send(_) | Act::Read { .. } | Act::Driver(..) => {
-            return Err(NotNow::Refused(ONLY));
+            return Err(StepError::Refused(ONLY));
         }
     }
     Ok(())

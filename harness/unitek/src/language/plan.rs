@@ -30,7 +30,6 @@ const PATIENCE: Span = Span::from_millis(1000);
 /// The highest number of a drive (UNITEK 3.1).
 const MOST_NODES: i64 = 127;
 
-/// A frame that the master must receive.
 #[derive(Clone, Debug)]
 pub(crate) struct WantedFrame {
     pub(crate) id: Id,
@@ -39,7 +38,6 @@ pub(crate) struct WantedFrame {
     pub(crate) data: Vec<Expected>,
 }
 
-/// What a register must read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct WantedValue {
     pub(crate) register: u8,
@@ -57,7 +55,6 @@ pub(crate) enum Act {
     Harm(u8, DriveHarm),
     /// This happens to a drive from outside its bus.
     Outside(u8, Stimulus),
-    /// A drive is switched off and on.
     Restart(u8),
     /// No frame has come that no line asked for.
     Quiet,
@@ -88,14 +85,12 @@ pub(crate) enum WantedOutcome {
     NotReady,
 }
 
-/// What settles the steps.
 #[derive(Debug)]
 pub(crate) struct Planner {
     setup: Setup,
     scope: Scope,
 }
 
-/// Settles the header.
 pub(super) fn settle(
     scenario: &Scenario<Unitek>,
     size: Option<u8>,

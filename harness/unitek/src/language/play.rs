@@ -36,7 +36,6 @@ pub(crate) struct State {
     deviation: Option<&'static MasterDeviation>,
 }
 
-/// The driver of one drive.
 #[derive(Debug)]
 struct Driver {
     master: DeviantMaster,
@@ -108,7 +107,6 @@ impl State {
     }
 }
 
-/// Whether a frame is what is wanted.
 pub(super) fn matches(wanted: &WantedFrame, frame: &Frame) -> bool {
     let length = usize::from(wanted.remote.unwrap_or(0)).max(wanted.data.len());
     let same = frame.id() == wanted.id

@@ -11,7 +11,6 @@ use harness_proto::unitek::units::{Decimal, Given};
 use harness_sim::unitek::Control;
 use harness_sim::unitek::deviation::{Deviation, MasterDeviation};
 
-/// The header lines of this bus.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Header {
     /// `rate 500`, in kbit/s.
@@ -22,7 +21,6 @@ pub(crate) struct Header {
     pub(crate) master: Option<Spanned<&'static MasterDeviation>>,
 }
 
-/// A header line about a drive.
 #[derive(Clone, Debug)]
 pub(crate) struct DriveLine {
     pub(crate) drive: Located,
@@ -103,7 +101,6 @@ pub(crate) enum ValueKind {
     Counted(Located),
 }
 
-/// What a register must read.
 #[derive(Clone, Debug)]
 pub(crate) struct Expect {
     pub(crate) value: WrittenValue,
@@ -120,7 +117,6 @@ pub(crate) struct Message {
     pub(crate) span: TextSpan,
 }
 
-/// What a frame carries.
 #[derive(Clone, Debug)]
 pub(crate) enum Content {
     /// No data bytes.
@@ -168,14 +164,12 @@ pub(crate) enum DriveHarm {
     BusOff,
 }
 
-/// A job of the master.
 #[derive(Clone, Debug)]
 pub(crate) struct JobStep {
     pub(crate) drive: Located,
     pub(crate) what: JobKind,
 }
 
-/// What a job does.
 #[derive(Clone, Debug)]
 pub(crate) enum JobKind {
     /// `read 1 STATUS = 0181`.

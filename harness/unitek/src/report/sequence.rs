@@ -18,14 +18,14 @@ const JITTER: Span = Span::from_millis(2);
 const WORDS: usize = 640;
 
 /// The first frame of an arrow, and the frames of the same cycle that are folded into it.
-struct Folded<'t> {
+struct Fold<'t> {
     first: &'t LineFrame,
     last: &'t LineFrame,
     times: usize,
 }
 
 /// The last two frames of a drive with one register, since the master's last frame.
-struct Begun {
+struct Recurrence {
     arrow: usize,
     at: Instant,
     gap: Option<Span>,
@@ -67,9 +67,9 @@ fn receiver(frame: &LineFrame) -> Option<u8> {
 
 /// The arrows. A frame is folded into the one before it of the same drive and register where the gaps are those of a cycle, and the
 /// master has sent nothing since.
-fn folded(trace: &Trace) -> Vec<Folded<'_>> {
-    let mut arrows: Vec<Folded<'_>> = Vec::new();
-    let mut begun: BTreeMap<(u8, Option<u8>), Begun> = BTreeMap::new();
+fn folded(trace: &Trace) -> Vec<Fold<'_>> {
+    let mut arrows: Vec<Fold<'_>> = Vec::new();
+    let mut begun: BTreeMap<(u8, Option<u8>), Recurrence> = BTreeMap::new();
     for frame in frames(trace) {
         let key = frame
             .from
@@ -91,7 +91,7 @@ fn folded(trace: &Trace) -> Vec<Folded<'_>> {
                 let arrow = arrows.len();
                 begun.insert(
                     key,
-                    Begun {
+                    Recurrence {
                         arrow,
                         at: frame.at,
                         gap,
@@ -104,8 +104,8 @@ fn folded(trace: &Trace) -> Vec<Folded<'_>> {
     arrows
 }
 
-fn one(frame: &LineFrame) -> Folded<'_> {
-    Folded {
+fn one(frame: &LineFrame) -> Fold<'_> {
+    Fold {
         first: frame,
         last: frame,
         times: 1,
@@ -116,8 +116,7 @@ fn alike(one: Span, other: Span) -> bool {
     one.max(other) <= one.min(other) + JITTER
 }
 
-/// The arrow as it is drawn.
-fn drawn(folded: &Folded<'_>) -> Arrow {
+fn drawn(folded: &Fold<'_>) -> Arrow {
     let LineFrame {
         at,
         from,

@@ -117,7 +117,7 @@ struct RegisterInterlock {
     sends_itself: bool,
 }
 
-enum LookedAt {
+enum Look {
     Holds,
     Broken(String),
     Silent,
@@ -161,14 +161,14 @@ impl Watch for RegisterInterlocks {
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String> {
         for entry in self.all.iter_mut().filter(|entry| entry.next <= now) {
             entry.next = now + entry.every;
-            let mut asks = Asks {
+            let mut asks = RegisterReader {
                 line,
                 patience: self.patience,
                 tries: 1,
                 unasked: &mut self.unasked,
             };
             // In the middle of a scenario a drive may be silent on purpose; between scenarios it must answer.
-            if let LookedAt::Broken(why) = entry.look(&mut asks) {
+            if let Look::Broken(why) = entry.look(&mut asks) {
                 return Err(why);
             }
         }
@@ -179,16 +179,16 @@ impl Watch for RegisterInterlocks {
         for entry in &mut self.all {
             // Nothing is under way: the way to the safe state has ended what the conversation before had begun.
             (entry.scaling, entry.sends_itself) = (None, false);
-            let mut asks = Asks {
+            let mut asks = RegisterReader {
                 line,
                 patience: self.patience,
                 tries: TRIES,
                 unasked: &mut self.unasked,
             };
             match entry.look(&mut asks) {
-                LookedAt::Holds => {}
-                LookedAt::Broken(why) => return Err(Trouble::Interlock(why)),
-                LookedAt::Silent => {
+                Look::Holds => {}
+                Look::Broken(why) => return Err(Trouble::Interlock(why)),
+                Look::Silent => {
                     let why = format!(
                         "{} cannot be read: the drive does not answer",
                         entry.interlock.words(entry.register.name)
@@ -247,13 +247,13 @@ impl RegisterInterlock {
         self.scaling.is_none() && usual(self.register.unit).is_some()
     }
 
-    fn look(&mut self, asks: &mut Asks<'_, '_>) -> LookedAt {
+    fn look(&mut self, asks: &mut RegisterReader<'_, '_>) -> Look {
         if self.lacks_scale() {
             let read = [0xCE, 0xC6, 0xD9].map(|number| asks.ask(self, number));
             let [Some(rpm_max), Some(device_current), Some(units_at_200)] =
                 read.map(|answer| answer.map(|reply| low(reply.data)))
             else {
-                return LookedAt::Silent;
+                return Look::Silent;
             };
             self.scaling = Some(Scaling {
                 rpm_max,
@@ -262,11 +262,11 @@ impl RegisterInterlock {
             });
         }
         if self.sends_itself {
-            return LookedAt::Holds;
+            return Look::Holds;
         }
         match asks.ask(self, self.register.number) {
-            None => LookedAt::Silent,
-            Some(reply) => self.broken(reply).map_or(LookedAt::Holds, LookedAt::Broken),
+            None => Look::Silent,
+            Some(reply) => self.broken(reply).map_or(Look::Holds, Look::Broken),
         }
     }
 
@@ -312,14 +312,14 @@ impl RegisterInterlock {
 }
 
 /// Asks drives over a line.
-struct Asks<'a, 'l> {
+struct RegisterReader<'a, 'l> {
     line: &'a mut (dyn Line + 'l),
     patience: Span,
     tries: u8,
     unasked: &'a mut Vec<(Instant, Heard)>,
 }
 
-impl Asks<'_, '_> {
+impl RegisterReader<'_, '_> {
     /// Reads a register; `None` where no reply comes.
     fn ask(&mut self, entry: &RegisterInterlock, register: u8) -> Option<Reply> {
         let frame = Request::Read { register }.encode(entry.axis.rx).ok()?;

@@ -10,7 +10,6 @@ use harness_proto::unitek::frame::READ;
 use harness_proto::unitek::properties::Dlc4;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most frames of an attempt that are kept.
 const MOST_KEPT: usize = 100_000;
 
 /// The time of a frame of eight bytes at 100 kbit/s, and some more (UNITEK 3.1).
@@ -20,22 +19,22 @@ const LONGEST_FRAME: Span = Span::from_micros(1_500);
 pub(super) type Observed<'l> = harness_bench::rig::playing::observed::Observed<'l, FrameNotes>;
 
 /// A drive, by the identifier that it had before the first frame.
-type Addressed = u16;
+type FirstIdentifier = u16;
 
 /// Registers that may have been written, with the drives.
-pub(super) type Written = BTreeSet<(Addressed, u8)>;
+pub(super) type WrittenRegisters = BTreeSet<(FirstIdentifier, u8)>;
 
 /// An identifier that was written to this register of a drive.
-pub(super) type Given = (u8, u16, Addressed);
+pub(super) type GivenIdentifier = (u8, u16, FirstIdentifier);
 
 #[derive(Debug, Default)]
 pub(super) struct FrameNotes {
     /// The registers that frames may have written.
-    pub(super) written: Written,
+    pub(super) written: WrittenRegisters,
     /// The levels of the EEPROM that frames may have stored (84), with the drives.
-    stored: BTreeSet<(Addressed, u16)>,
+    stored: BTreeSet<(FirstIdentifier, u16)>,
     /// The identifiers that were written to 68, 69 and 88.
-    pub(super) given: Vec<Given>,
+    pub(super) given: Vec<GivenIdentifier>,
     /// The last request, by register, and when it had left.
     asked: Option<(u8, Instant)>,
     /// The registers of the requests of this conversation without a reply: one that was late is answered again where it was repeated.
@@ -178,7 +177,7 @@ impl FrameNotes {
     }
 
     /// The drive to which a frame with this identifier goes.
-    fn addressed(&self, id: u16) -> Addressed {
+    fn addressed(&self, id: u16) -> FirstIdentifier {
         let mut given = self.given.iter().rev();
         let found = given.find(|given| given.0 != 0x69 && given.1 == id);
         found.map_or(id, |given| given.2)

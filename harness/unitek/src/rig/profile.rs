@@ -16,9 +16,9 @@ use harness_proto::unitek::properties::{Accepts, Description, Setting};
 
 /// The properties of drives that a profile says: the number of the drive, the property and its value.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Profiled(Vec<(u8, &'static Description, PropertyValue)>);
+pub(super) struct ProfileSettings(Vec<(u8, &'static Description, PropertyValue)>);
 
-impl Profiled {
+impl ProfileSettings {
     /// Those of a rig; none where its file names no profile.
     pub(super) fn of(rig: &Rig) -> Self {
         let Some(profile) = &rig.profile else {

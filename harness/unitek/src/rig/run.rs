@@ -1,7 +1,7 @@
 //! UNITEK drives on which scenarios are played: what their player offers.
 
 use super::player::{Own, Player, stores};
-use super::profile::Profiled;
+use super::profile::ProfileSettings;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
 use super::set_back::set_back;
@@ -53,7 +53,7 @@ impl PortPlayer for Player {
                 player.qualify();
                 player
             }
-            false => player.with_profile(Profiled::of(rig)),
+            false => player.with_profile(ProfileSettings::of(rig)),
         }
     }
 

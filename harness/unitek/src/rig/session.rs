@@ -98,10 +98,8 @@ impl PortDrives for UnitekDrives {
 
 /// What a session of these drives has beside what all have.
 pub(crate) trait OfUnitek {
-    /// Its drives.
     fn axes(&self) -> &[Axis];
 
-    /// A driver of its drives.
     fn driver(&mut self) -> Driver<'_>;
 }
 

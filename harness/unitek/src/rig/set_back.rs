@@ -2,7 +2,7 @@
 //! that does it.
 
 use super::known::Known;
-use super::observed::{FrameNotes, Given, Written};
+use super::observed::{FrameNotes, GivenIdentifier, WrittenRegisters};
 use super::{Axis, Session};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
@@ -115,7 +115,7 @@ impl HeldBefore {
 pub(super) fn set_back(
     session: &mut Session,
     drives: &[Known],
-    written: &Written,
+    written: &WrittenRegisters,
     stored: &BTreeSet<(u16, u16)>,
 ) -> Vec<String> {
     let rig = session.rig().clone();
@@ -155,7 +155,12 @@ pub(super) fn set_back(
 
 /// Says what is about to be written to drives, and the identifiers that they are given, with the commands that set it back. A drive is stopped on
 /// these identifiers too.
-pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, given: &[Given]) {
+pub(super) fn foretell(
+    left: &NotPutBack,
+    drives: &[Known],
+    written: &WrittenRegisters,
+    given: &[GivenIdentifier],
+) {
     let origin = left.origin();
     let of_drive = |known: &Known| {
         let mut before = held_before(known, written);
@@ -192,7 +197,7 @@ pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, g
 }
 
 /// The identifiers that a drive may have: that of the rig's file first, and those that were written to a register.
-fn places(axis: Axis, given: &[Given], register: u8) -> impl Iterator<Item = u16> {
+fn places(axis: Axis, given: &[GivenIdentifier], register: u8) -> impl Iterator<Item = u16> {
     let first = if register == 0x68 { axis.rx } else { axis.tx };
     let ids = given
         .iter()
@@ -202,7 +207,7 @@ fn places(axis: Axis, given: &[Given], register: u8) -> impl Iterator<Item = u16
 }
 
 /// On which identifiers a drive may be found, and the command that sets them back; `None` for those of the rig's file.
-fn moved(axis: Axis, given: &[Given], origin: &str) -> Option<String> {
+fn moved(axis: Axis, given: &[GivenIdentifier], origin: &str) -> Option<String> {
     let [rx, tx] = IDENTIFIERS.map(|register| {
         let ids = places(axis, given, register).map(|id| format!("{id:03X}"));
         ids.collect::<Vec<_>>().join(" or ")
@@ -221,7 +226,7 @@ fn moved(axis: Axis, given: &[Given], origin: &str) -> Option<String> {
 }
 
 /// What the registers held at first that may have been written, CAN_TIMEOUT before the others.
-fn held_before(known: &Known, written: &Written) -> Vec<(u8, u32)> {
+fn held_before(known: &Known, written: &WrittenRegisters) -> Vec<(u8, u32)> {
     let written = |register| written.contains(&(known.axis.rx, register));
     // 83 has loaded all parameters.
     let all = written(0x83);
@@ -253,7 +258,6 @@ fn needs_motion(register: u8) -> bool {
     matches!(class(register), Class::Motion | Class::EepromAndMotion)
 }
 
-/// How many hexadecimal digits a register has.
 const fn digits(register: &Register) -> usize {
     match register.width {
         Width::Bits16 => 4,
@@ -269,7 +273,11 @@ struct SetBack<'d, 'l> {
 
 impl SetBack<'_, '_> {
     /// Sets registers back that may have been written.
-    fn registers(&mut self, known: &Known, written: &Written) -> Result<Vec<String>, Error> {
+    fn registers(
+        &mut self,
+        known: &Known,
+        written: &WrittenRegisters,
+    ) -> Result<Vec<String>, Error> {
         let mut notes = Vec::new();
         for (register, raw) in held_before(known, written) {
             notes.extend(self.register(register, raw)?);

@@ -1,6 +1,6 @@
 //! Jobs of the master: `exchange 8 STW=047F HSW=50%`.
 
-use super::super::syntax::{JobKind, JobStep, Wanted, WordKind, WordName, WordValue};
+use super::super::syntax::{JobKind, JobStep, WantedAnswer, WordKind, WordName, WordValue};
 use super::{slave, value};
 use harness_bench::scenario::expression;
 use harness_bench::scenario::parse::words::{equals, named};
@@ -57,11 +57,11 @@ fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
             let wanted = match scanner.at_end() {
                 true => None,
                 false if scanner.eat_word("error") => {
-                    Some(Wanted::Error(expression::sum(scanner)?))
+                    Some(WantedAnswer::Error(expression::sum(scanner)?))
                 }
                 false => {
                     equals(scanner)?;
-                    Some(Wanted::Value(value::value(scanner)?))
+                    Some(WantedAnswer::Value(value::value(scanner)?))
                 }
             };
             JobKind::Read(name, wanted)

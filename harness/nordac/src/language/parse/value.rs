@@ -7,7 +7,6 @@ use harness_bench::scenario::problem::{Problem, nearest};
 use harness_bench::scenario::scanner::Scanner;
 use harness_proto::nordac::{PARAMETERS, Parameter};
 
-/// Most digits of a decimal number.
 const MOST_DIGITS: usize = 12;
 
 /// `1205.3 = 50.0Hz`

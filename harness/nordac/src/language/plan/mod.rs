@@ -8,7 +8,7 @@ use self::value::{parameter, raw, up_to, word};
 use super::Nordac;
 use super::syntax::{
     Bad, Damage, JobKind, JobStep, Message, OctetHarm, Outside, Sender, SetupKind, SlaveLine,
-    TelegramHarm, TelegramStep, Wanted, WordKind, WordName, WordValue,
+    TelegramHarm, TelegramStep, WantedAnswer, WordKind, WordName, WordValue,
 };
 use crate::simulate::{self, SlaveSetup};
 use harness_bench::counted::counted;
@@ -42,7 +42,6 @@ pub(crate) struct SentTelegram {
     pub(crate) bad: Vec<(usize, LinkFault)>,
 }
 
-/// An octet that the master must receive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WantedOctet {
     pub(crate) octet: Expected,
@@ -53,13 +52,11 @@ pub(crate) struct WantedOctet {
 /// A step of this bus, settled.
 #[derive(Clone, Debug)]
 pub(crate) enum PlannedAct {
-    /// This happens on the line.
     Fault(LineFaultAt),
     /// A slave loses its supply, or has it again.
     Power(u8, bool),
     /// This happens to a slave from outside the bus.
     Outside(u8, Stimulus),
-    /// A slave is switched off and on.
     Restart(u8),
     /// Nothing has come that no line asked for.
     Quiet,
@@ -83,7 +80,6 @@ pub(crate) enum PlannedJob {
         /// What the reply must hold.
         expect: Vec<(WordName, PlannedWord)>,
     },
-    /// A value is read.
     Read(PlannedParameter, Option<PlannedWanted>),
     /// A value is written; it must be refused with this error, if one is given.
     Write(PlannedParameter, u32, Option<u16>),
@@ -96,7 +92,6 @@ pub(crate) enum PlannedJob {
     Acknowledge,
 }
 
-/// What a read must give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PlannedWanted {
     /// This raw value.
@@ -104,14 +99,12 @@ pub(crate) enum PlannedWanted {
     Error(u16),
 }
 
-/// What settles the steps.
 #[derive(Debug)]
 pub(crate) struct Planner {
     bench: simulate::Setup,
     scope: Scope,
 }
 
-/// Settles the header.
 pub(super) fn settle(
     scenario: &Scenario<Nordac>,
     size: Option<u8>,
@@ -288,10 +281,12 @@ impl Planner {
                 let named = parameter(name, self.scope)?;
                 let wanted = match wanted {
                     None => None,
-                    Some(Wanted::Value(value)) => {
+                    Some(WantedAnswer::Value(value)) => {
                         Some(PlannedWanted::Value(raw(value, named, self.scope)?))
                     }
-                    Some(Wanted::Error(number)) => Some(PlannedWanted::Error(self.error(number)?)),
+                    Some(WantedAnswer::Error(number)) => {
+                        Some(PlannedWanted::Error(self.error(number)?))
+                    }
                 };
                 PlannedJob::Read(named, wanted)
             }

@@ -189,7 +189,6 @@ impl PlannedParameter {
     }
 }
 
-/// The bytes of a word.
 pub(super) fn word(value: &WordValue, scope: Scope) -> Result<PlannedWord, Problem> {
     let (number, most) = match &value.kind {
         WordKind::Bytes(bytes) => return Ok(bytes.clone()),

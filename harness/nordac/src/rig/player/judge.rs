@@ -2,11 +2,11 @@
 
 use super::note::kind;
 use super::rehearse::Other;
-use super::worlds::{Differs, MOST_LOST, TOO_MANY, right_slaves_send};
-use super::{Left, Own, Player};
+use super::worlds::{Divergence, MOST_LOST, TOO_MANY, right_slaves_send};
+use super::{AttemptEvidence, Own, Player};
 use crate::rig::known::value_of;
-use crate::rig::observed::{Came, Turn};
-use crate::rig::settle::{Assumed, search};
+use crate::rig::observed::{ReceivedOctets, Turn};
+use crate::rig::settle::{Assumptions, search};
 use crate::rig::talk::TalkError;
 use crate::value::hex;
 use harness_bench::scenario::problem::TextSpan;
@@ -24,7 +24,12 @@ const LOST_BY_THE_LINE: usize = 2;
 
 impl Player {
     /// The outcome where the slaves could not be made ready.
-    pub(super) fn unanswered(&mut self, scenario: &Own, error: &TalkError, left: &Left) -> Outcome {
+    pub(super) fn unanswered(
+        &mut self,
+        scenario: &Own,
+        error: &TalkError,
+        left: &AttemptEvidence,
+    ) -> Outcome {
         let remark = error.to_string();
         let exact = left.way.tolerance == Span::ZERO;
         let silent = matches!(error, TalkError::NoReply { .. });
@@ -62,7 +67,7 @@ impl Player {
     }
 
     /// What no right slave sends, where nothing that the line has lost or a stream has parted explains it.
-    fn differs(&mut self, scenario: &Own, left: &Left) -> Option<Differs> {
+    fn differs(&mut self, scenario: &Own, left: &AttemptEvidence) -> Option<Divergence> {
         let turns = &left.turns;
         let sent = right_slaves_send(self.known(), self.rate, 0, turns, &self.beats);
         let differs = sent.err().filter(|differs| differs.open.is_none())?;
@@ -70,7 +75,12 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the slave; behind an adapter, whether anything that it sent does.
-    pub(super) fn judged(&mut self, scenario: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    pub(super) fn judged(
+        &mut self,
+        scenario: &Own,
+        outcome: Outcome,
+        left: &AttemptEvidence,
+    ) -> Outcome {
         let judged = [Verdict::Passed, Verdict::Failed].contains(&outcome.verdict);
         if left.way.tolerance > Span::ZERO && judged {
             return self.judged_by_times(scenario, outcome, left);
@@ -93,7 +103,12 @@ impl Player {
     }
 
     /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
-    fn judged_by_times(&mut self, scenario: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    fn judged_by_times(
+        &mut self,
+        scenario: &Own,
+        outcome: Outcome,
+        left: &AttemptEvidence,
+    ) -> Outcome {
         let turns = &left.turns;
         let late = left.way.late.max(left.way.longest);
         let not_shown = |verdict, why: &str| {
@@ -102,7 +117,7 @@ impl Player {
         };
         let sent = right_slaves_send(self.known(), self.rate, 0, turns, &self.beats);
         match sent {
-            Err(Differs {
+            Err(Divergence {
                 open: Some(why), ..
             }) => return not_shown(Verdict::Inconclusive, why),
             Err(differs) => match self.lost(scenario, turns) {
@@ -155,7 +170,7 @@ impl Player {
         let sent = right_slaves_send(self.known(), self.rate, MOST_LOST, turns, &self.beats);
         let lost = match sent {
             Ok(lost) => lost,
-            Err(Differs { open, .. }) => {
+            Err(Divergence { open, .. }) => {
                 return open.filter(|why| *why == TOO_MANY).map(str::to_owned);
             }
         };
@@ -184,7 +199,7 @@ impl Player {
     }
 
     /// The same as [`Self::explained`], unless a slave was proven wrong before.
-    fn excused(&mut self, scenario: &Own, left: &Left) -> Option<String> {
+    fn excused(&mut self, scenario: &Own, left: &AttemptEvidence) -> Option<String> {
         if self.proven {
             return None;
         }
@@ -194,8 +209,8 @@ impl Player {
     }
 
     /// In what right slaves that send the very same octets differ from what is known of the slaves; `None` if no right slaves send them.
-    fn explained(&self, scenario: &Own, left: &Left) -> Option<String> {
-        let base: Assumed = self.known().iter().map(|known| known.properties).collect();
+    fn explained(&self, scenario: &Own, left: &AttemptEvidence) -> Option<String> {
+        let base: Assumptions = self.known().iter().map(|known| known.properties).collect();
         let open: Vec<Vec<_>> = self
             .known()
             .iter()
@@ -209,7 +224,7 @@ impl Player {
         let may = |place: usize, property: &Description| {
             open[place].iter().any(|point| point.name == property.name)
         };
-        let came = |all: &Assumed| -> Came {
+        let came = |all: &Assumptions| -> ReceivedOctets {
             let other = Other {
                 properties: Some(all),
                 switches: left.switches,
@@ -234,7 +249,7 @@ impl Player {
 }
 
 /// A reply that no right slave sends.
-fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
+fn accused(outcome: Outcome, differs: &Divergence, turns: &[Turn]) -> Outcome {
     let turn = turns.get(differs.turn);
     let message = said(differs, turns);
     let finding = match outcome.finding {
@@ -262,7 +277,7 @@ fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
 }
 
 /// What the slave replied, and what a right one replies, in a sentence.
-fn said(differs: &Differs, turns: &[Turn]) -> String {
+fn said(differs: &Divergence, turns: &[Turn]) -> String {
     let turn = turns.get(differs.turn);
     let came: Vec<u8> = turn.map_or(Vec::new(), |turn| {
         turn.came.iter().map(|octet| *octet as u8).collect()

@@ -13,15 +13,15 @@ mod shorten;
 mod unlock;
 mod worlds;
 
-use note::Behind;
+use note::DeviantValues;
 pub(crate) use note::SlaveNote;
 pub(super) use ready::idle;
-pub(super) use rehearse::Begun;
+pub(super) use rehearse::PlayableScenario;
 
 use super::RigSlave;
 use super::known::{INTERFACE, Known};
-use super::observed::{Came, Observed, Turn, Written};
-use super::profile::Profiled;
+use super::observed::{Observed, ReceivedOctets, Turn, WrittenParameter};
+use super::profile::ProfileSettings;
 use super::settle;
 use super::talk::{Talk, TalkError};
 use crate::gate::GuardsSlaves as _;
@@ -81,10 +81,10 @@ enum AttemptCourse {
 }
 
 /// What is left of an attempt to judge it by.
-struct Left {
+struct AttemptEvidence {
     way: LinkTimes,
     /// What came from the first telegram on that makes the slaves ready.
-    came: Came,
+    came: ReceivedOctets,
     /// Whether the settings of the bus were switched to those of the scenario.
     switches: bool,
     /// Whether the slaves sent anything.
@@ -107,13 +107,13 @@ pub(crate) struct Player {
     /// Known from the first attempt on.
     pub(super) known: Option<Vec<Known>>,
     /// What the last attempt may have written: station, number and IND.
-    pub(super) written: BTreeSet<Written>,
+    pub(super) written: BTreeSet<WrittenParameter>,
     /// Where it says what a scenario changes, before it does.
     pub(super) left: NotPutBack,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
     /// What the profile of the rig's file says.
-    pub(super) profile: Profiled,
+    pub(super) profile: ProfileSettings,
     /// What was found out of the slaves where finding out has failed.
     partly: Vec<Known>,
     /// What a slave did that no right slave does, before the first scenario: its verdict says so.
@@ -128,16 +128,14 @@ pub(crate) struct Player {
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
     notes: Vec<SlaveNote>,
-    behind: Behind,
+    behind: DeviantValues,
 }
 
-/// Slaves that are ready for a scenario.
-struct MadeReady {
+struct ReadySlaves {
     /// Whether settings of the bus were switched for it.
     switches: bool,
     /// The scenario with shorter waits, which is played in its place.
     shorter: Option<Own>,
-    /// Whether a fault came meanwhile.
     faulted: bool,
 }
 
@@ -160,7 +158,7 @@ impl Player {
             written: BTreeSet::new(),
             left: NotPutBack::default(),
             before: None,
-            profile: Profiled::default(),
+            profile: ProfileSettings::default(),
             partly: Vec::new(),
             unlike: None,
             proven: false,
@@ -169,7 +167,7 @@ impl Player {
             lost: BTreeMap::new(),
             beats: Beats::default(),
             notes: Vec::new(),
-            behind: Behind::default(),
+            behind: DeviantValues::default(),
         }
     }
 
@@ -243,7 +241,7 @@ impl Player {
         if let Some(begun) = begun {
             self.note(begun, scenario, &link, switches, &gone);
         }
-        let left = Left {
+        let left = AttemptEvidence {
             way: LinkTimes {
                 late: link.take_late(),
                 longest: link.noted.longest,
@@ -290,10 +288,10 @@ impl Player {
         }
         let begun = match self.made_ready(scenario, link, again) {
             // What the slaves keep of the time before is another thing now.
-            Ok(MadeReady { faulted: true, .. }) => self.made_ready(scenario, link, again),
+            Ok(ReadySlaves { faulted: true, .. }) => self.made_ready(scenario, link, again),
             begun => begun,
         };
-        let MadeReady {
+        let ReadySlaves {
             switches, shorter, ..
         } = match begun {
             Ok(ready) => ready,
@@ -322,14 +320,14 @@ impl Player {
         scenario: &Own,
         link: &mut Observed<'_>,
         again: Option<bool>,
-    ) -> Result<MadeReady, Box<(AttemptCourse, bool)>> {
+    ) -> Result<ReadySlaves, Box<(AttemptCourse, bool)>> {
         let unanswered = |switches| {
             move |error: TalkError| Box::new((AttemptCourse::Unanswered(error), switches))
         };
         let skipped = |skip: Skip| Box::new((AttemptCourse::Skipped(skip), false));
         self.look(scenario, link).map_err(unanswered(false))?;
         let begun = match again {
-            Some(switches) => Begun {
+            Some(switches) => PlayableScenario {
                 switches,
                 moved: BTreeSet::new(),
                 written: BTreeSet::new(),
@@ -353,7 +351,7 @@ impl Player {
         let ready = self.prepare(scenario, link, switches);
         self.before = Some(link.noted.received());
         let faulted = ready.map_err(unanswered(switches))?;
-        Ok(MadeReady {
+        Ok(ReadySlaves {
             switches,
             shorter,
             faulted,
@@ -379,7 +377,7 @@ impl Player {
             }
         };
         let exact = link.time_tolerance() == Span::ZERO;
-        let came = |came: Came| if exact { came } else { came.at_any_time() };
+        let came = |came: ReceivedOctets| if exact { came } else { came.at_any_time() };
         for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
             let seen = came(seen);
             let conversed = |slaves| came(self.conversed(known, slaves, (&seen, exact)));
@@ -444,7 +442,11 @@ impl Player {
     }
 
     /// Reads a slave, and holds the conversation that settles what the manual leaves open. Returns what came in it.
-    fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<Came, TalkError> {
+    fn learn_of(
+        &self,
+        known: &mut Known,
+        link: &mut Observed<'_>,
+    ) -> Result<ReceivedOctets, TalkError> {
         let address = known.slave.address;
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
         talk.restart(address);
@@ -473,7 +475,12 @@ impl Player {
 
     /// What comes from a model of a slave in the conversation that settles what the manual leaves open, up to the first octet that was not
     /// `seen`, its time included or not.
-    fn conversed(&self, known: &Known, properties: Properties, seen: (&Came, bool)) -> Came {
+    fn conversed(
+        &self,
+        known: &Known,
+        properties: Properties,
+        seen: (&ReceivedOctets, bool),
+    ) -> ReceivedOctets {
         let mut link = self.model(vec![known.model(properties)], &self.limits);
         let mut link = Observed::new(&mut link);
         let mut talk = Talk::new(Box::new(&mut link), self.patience);

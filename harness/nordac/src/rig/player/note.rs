@@ -6,8 +6,8 @@
 use super::worlds::{could_send, right_slaves_send};
 use super::{AttemptCourse, Own, Player};
 use crate::rig::known::{INTERFACE, Known, Values, stated};
-use crate::rig::observed::{Agreement, Came, Observed, Turn, WHOLE};
-use crate::rig::settle::{Assumed, search};
+use crate::rig::observed::{Agreement, Observed, ReceivedOctets, Turn, WHOLE};
+use crate::rig::settle::{Assumptions, search};
 use crate::rig::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
 use harness_bench::link::{Link as _, LinkEvent, Recording};
@@ -56,7 +56,7 @@ struct AttemptShown {
     /// How it ended, and at which place of the text.
     ended: Option<(Verdict, Option<usize>)>,
     /// The octets that came; none where time is real.
-    came: Came,
+    came: ReceivedOctets,
     /// Where time is real, the telegrams: by addresses and service the contents, one behind the other where they change.
     telegrams: BTreeMap<String, Vec<String>>,
 }
@@ -82,7 +82,7 @@ impl AttemptShown {
         Self {
             unanswered,
             ended,
-            came: if exact { came } else { Came::default() },
+            came: if exact { came } else { Default::default() },
             telegrams,
         }
     }
@@ -165,7 +165,7 @@ impl SlaveNote {
         place: usize,
         property: &Description,
     ) -> Vec<String> {
-        let base: Assumed = known.iter().map(|known| known.properties).collect();
+        let base: Assumptions = known.iter().map(|known| known.properties).collect();
         let none = Values::new();
         let explains = |word: &String| {
             let mut all = base.clone();
@@ -230,7 +230,7 @@ impl SlaveNote {
     }
 
     fn is_shown_by(&self, other: Other, held: &Values) -> bool {
-        let base: Assumed = self.slaves.iter().map(|known| known.properties).collect();
+        let base: Assumptions = self.slaves.iter().map(|known| known.properties).collect();
         if let Other::WrongSlave(..) = other {
             return self.shown_by(other, &base, held) == self.shown;
         }
@@ -277,7 +277,7 @@ impl SlaveNote {
     }
 
     /// What the attempt shows on models.
-    fn shown_by(&self, other: Other, properties: &Assumed, held: &Values) -> AttemptShown {
+    fn shown_by(&self, other: Other, properties: &Assumptions, held: &Values) -> AttemptShown {
         let mut last = self.played_by(other, held, properties, None);
         // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
         if last != self.shown && self.slaves.iter().any(|slave| slave.values.is_empty()) {
@@ -290,7 +290,7 @@ impl SlaveNote {
         &self,
         other: Other,
         held: &Values,
-        properties: &Assumed,
+        properties: &Assumptions,
         interface: Option<i64>,
     ) -> AttemptShown {
         let mut player = self.begun.clone();
@@ -381,9 +381,9 @@ impl Note for SlaveNote {
 /// What parameters of the slave at a place hold if it has the deviation with this name and that changes what they read. It is worked out once in
 /// a part of a qualification, so that every attempt knows the same.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Behind(Arc<Mutex<BTreeMap<(usize, &'static str), Values>>>);
+pub(super) struct DeviantValues(Arc<Mutex<BTreeMap<(usize, &'static str), Values>>>);
 
-impl Behind {
+impl DeviantValues {
     fn get(&self, key: (usize, &'static str), read: impl FnOnce() -> Values) -> Values {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.entry(key).or_insert_with(read).clone()

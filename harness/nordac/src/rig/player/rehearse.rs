@@ -5,8 +5,8 @@ use super::{Own, Player};
 use crate::language::syntax;
 use crate::rig::MASTER;
 use crate::rig::known::value_of;
-use crate::rig::observed::{Came, Observed, Turn, Written};
-use crate::rig::settle::Assumed;
+use crate::rig::observed::{Observed, ReceivedOctets, Turn, WrittenParameter};
+use crate::rig::settle::Assumptions;
 use crate::rig::talk::TalkError;
 use crate::simulate::Bench;
 use harness_bench::link::{Line as _, Link as _, LinkEvent, Recording, Trouble};
@@ -22,11 +22,11 @@ use std::collections::BTreeSet;
 #[derive(Clone, Copy, Default)]
 pub(super) struct Other<'o> {
     /// The properties of the slaves in place of those that are known.
-    pub(super) properties: Option<&'o Assumed>,
+    pub(super) properties: Option<&'o Assumptions>,
     /// Whether the settings of the bus are switched to those of the scenario.
     pub(super) switches: bool,
     /// What came from the slaves, where the model is played up to the first difference from it.
-    pub(super) came: Option<&'o Came>,
+    pub(super) came: Option<&'o ReceivedOctets>,
     /// What the slaves keep of the time before.
     pub(super) past: Past,
 }
@@ -50,12 +50,12 @@ const PAST_FAULTS: [&[u8]; 2] = [
 ];
 
 /// A scenario that the rig plays.
-pub(in crate::rig) struct Begun {
+pub(in crate::rig) struct PlayableScenario {
     /// Whether the settings of the bus are switched to those of the scenario.
     pub(super) switches: bool,
     /// The addresses that it gives to slaves: the slave, and its new one.
     pub(in crate::rig) moved: BTreeSet<(u8, u8)>,
-    pub(in crate::rig) written: BTreeSet<Written>,
+    pub(in crate::rig) written: BTreeSet<WrittenParameter>,
 }
 
 /// A scenario played on the model.
@@ -66,11 +66,10 @@ pub(super) struct Rehearsal {
     faulted: Option<u8>,
     /// Why the slaves could not be put back.
     lost: Option<String>,
-    /// The addresses that it gives to slaves.
     moved: BTreeSet<(u8, u8)>,
-    written: BTreeSet<Written>,
+    written: BTreeSet<WrittenParameter>,
     /// What came from the first telegram on that makes the slaves ready.
-    pub(super) came: Came,
+    pub(super) came: ReceivedOctets,
     /// The telegrams of the bench, with what came behind each.
     pub(super) turns: Vec<Turn>,
 }
@@ -86,7 +85,7 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    pub(super) fn rehearsed(&self, scenario: &Own) -> Result<Begun, Why> {
+    pub(super) fn rehearsed(&self, scenario: &Own) -> Result<PlayableScenario, Why> {
         let other = self.other_port(scenario);
         let other = other.or_else(|| self.other_properties(scenario));
         if let Some(why) = other {
@@ -135,13 +134,13 @@ impl Player {
     ///
     /// # Errors
     /// Behind it a slave could not be put back, or stays with a fault.
-    fn begins(&self, played: Rehearsal, switches: bool) -> Result<Begun, Why> {
+    fn begins(&self, played: Rehearsal, switches: bool) -> Result<PlayableScenario, Why> {
         if let Some(why) = played.lost {
             return Err(Why::Denied(why));
         }
         match played.faulted.filter(|_| !self.acknowledges()) {
             Some(slave) => Err(left_in_fault(slave)),
-            None => Ok(Begun {
+            None => Ok(PlayableScenario {
                 switches,
                 moved: played.moved,
                 written: played.written,
@@ -276,7 +275,6 @@ impl Player {
         })
     }
 
-    /// Plays a scenario on the model within limits.
     pub(super) fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
         let known = self.known().iter().enumerate();
         let slaves = known.map(|(place, known)| {

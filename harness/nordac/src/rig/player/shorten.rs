@@ -68,7 +68,6 @@ impl Player {
     }
 }
 
-/// What was sent, and what came.
 fn replies(turns: &[Turn]) -> Vec<(Vec<u8>, Vec<u16>)> {
     let all = turns.iter();
     all.map(|turn| (turn.octets.clone(), turn.came.clone()))

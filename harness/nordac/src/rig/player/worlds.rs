@@ -8,7 +8,7 @@ mod line;
 
 use crate::rig::known::Known;
 use crate::rig::observed::{Agreement, Turn, WHOLE};
-use crate::rig::settle::{Assumed, search};
+use crate::rig::settle::{Assumptions, search};
 use crate::simulate::SlaveSetup;
 use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, lost};
 use harness_bench::rig::playing::observed::Beats;
@@ -39,7 +39,7 @@ pub(super) const TOO_MANY: &str = "what came has more worlds than are kept";
 
 /// Where the slaves differ from what came.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Differs {
+pub(super) struct Divergence {
     /// Behind which telegram, counted from 0.
     pub(super) turn: usize,
     /// What right ones would have sent.
@@ -61,14 +61,14 @@ pub(super) fn right_slaves_send(
     most_lost: usize,
     turns: &[Turn],
     beats: &Beats,
-) -> Result<Vec<usize>, Differs> {
+) -> Result<Vec<usize>, Divergence> {
     let talk = Talk::new(rate, turns, most_lost);
-    let slaves = |all: &Assumed| -> Vec<SlaveSetup> {
+    let slaves = |all: &Assumptions| -> Vec<SlaveSetup> {
         let slaves = known.iter().zip(all.iter().copied());
         slaves.map(|(known, open)| known.model(open)).collect()
     };
     let send = |slaves: &[SlaveSetup]| talk.sent_by(slaves, &|| beats.beat());
-    let base: Assumed = known.iter().map(|known| known.properties).collect();
+    let base: Assumptions = known.iter().map(|known| known.properties).collect();
     let first = send(&slaves(&base));
     if first.is_ok() {
         return first;
@@ -90,7 +90,7 @@ pub(super) fn right_slaves_send(
 }
 
 /// How far slaves send what came.
-fn agreement(found: &Result<Vec<usize>, Differs>) -> Agreement {
+fn agreement(found: &Result<Vec<usize>, Divergence>) -> Agreement {
     match found {
         Ok(_) => WHOLE,
         Err(differs) => differs.turn * 1024 + differs.agreed.min(1023),
@@ -105,13 +105,12 @@ pub(super) fn could_send(
     slaves: &[SlaveSetup],
     rate: BusRate,
     turns: &[Turn],
-) -> Result<(), Differs> {
+) -> Result<(), Divergence> {
     let mut talk = Talk::new(rate, turns, 0);
     (talk.talk.most_steps, talk.closely) = (STEPS_OF_A_NAME, false);
     talk.sent_by(slaves, &|| ()).map(|_| ())
 }
 
-/// The telegrams of an attempt.
 struct Talk {
     /// Times without what the inverters do not keep.
     talk: Dialogue<Piece>,
@@ -177,7 +176,7 @@ impl Talk {
     }
 
     /// Whether slaves that were just switched on could have sent what came; behind which telegrams something was lost.
-    fn sent_by(&self, slaves: &[SlaveSetup], alive: &dyn Fn()) -> Result<Vec<usize>, Differs> {
+    fn sent_by(&self, slaves: &[SlaveSetup], alive: &dyn Fn()) -> Result<Vec<usize>, Divergence> {
         let line = Line::<LONG>::new(slaves);
         let came = &self.talk.came;
         // Where nothing is late, that is seen at once, and to the octet: whole scans do not show each value of a motor.
@@ -205,7 +204,7 @@ impl Talk {
         let octets = place.and_then(|place| Some(&came.get(place)?.piece.octets));
         let octets = octets.into_iter().flatten();
         let last = self.talk.sent.len().saturating_sub(1);
-        Err(Differs {
+        Err(Divergence {
             turn: place.map_or(0, |place| self.turns.get(place).copied().unwrap_or(last)),
             agreed: wanted
                 .iter()

@@ -9,7 +9,6 @@ use harness_proto::unitek::register::Unit;
 use harness_proto::unitek::units::{Decimal, Given};
 use harness_proto::unitek::{ALIASES, BadName, REGISTERS, Register};
 
-/// Most digits of a decimal number.
 const MOST_DIGITS: usize = 12;
 
 impl RegisterName {

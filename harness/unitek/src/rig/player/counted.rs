@@ -6,7 +6,7 @@
 
 use super::super::Axis;
 use super::super::observed::Exchange;
-use super::worlds::{AHEAD, Came, LOST, MOST_LOST, Shown};
+use super::worlds::{AHEAD, LOST, MOST_LOST, Shown, TimedFrame};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Dlc4;
@@ -25,7 +25,6 @@ const DRIFT: u64 = 50;
 const MODE: u8 = 0x51;
 const COMMANDS: [u8; 2] = [0x31, 0x90];
 
-/// A cycle in a conversation.
 struct Cycle {
     every: u8,
     /// Where in what was sent its request stands, and the one that stops it.
@@ -36,14 +35,14 @@ struct Cycle {
 /// A conversation of cycles and single requests alone.
 struct Conversation<'t> {
     sent: Vec<(Instant, Option<Request>)>,
-    came: &'t [Came],
+    came: &'t [TimedFrame],
     read: Instant,
     cycles: BTreeMap<u8, Cycle>,
 }
 
 impl<'t> Conversation<'t> {
     /// `None` where it is more than that, or where there are not many cycles at once.
-    fn of(talk: &Exchange, came: &'t [Came], axis: Axis) -> Option<Self> {
+    fn of(talk: &Exchange, came: &'t [TimedFrame], axis: Axis) -> Option<Self> {
         let decode =
             |(at, frame): &(Instant, Frame)| (*at, Request::decode(frame, axis.rx, Dlc4::As3).ok());
         let mut all = Self {
@@ -89,7 +88,7 @@ impl<'t> Conversation<'t> {
                 Some(Request::Write { .. }) => return None,
             }
         }
-        let asked = |came: &Came| {
+        let asked = |came: &TimedFrame| {
             let first = came.2.data().first();
             first.is_some_and(|first| all.cycles.contains_key(first) || all.asks(*first) > 0)
         };
@@ -111,7 +110,7 @@ impl<'t> Conversation<'t> {
                 return None;
             };
             let alone = self.asks(register) == 1 && !self.cycles.contains_key(&register);
-            let reply = |came: &&Came| came.2.data().first() == Some(&register);
+            let reply = |came: &&TimedFrame| came.2.data().first() == Some(&register);
             let mut replies = self.came.iter().filter(reply);
             replies.next().filter(|_| alone).map(|came| came.1)
         })
@@ -133,7 +132,7 @@ impl<'t> Conversation<'t> {
 /// What the number of frames of each register shows where many cycles run at once; `None` where they are not counted.
 pub(super) fn counted(
     talk: &Exchange,
-    came: &[Came],
+    came: &[TimedFrame],
     axis: Axis,
     tolerance: Span,
 ) -> Option<Shown> {
@@ -141,7 +140,7 @@ pub(super) fn counted(
     let lossy = tolerance > Span::ZERO;
     let mut shown = Shown::Right;
     for (register, cycle) in &all.cycles {
-        let of_register = |came: &&Came| came.2.data().first() == Some(register);
+        let of_register = |came: &&TimedFrame| came.2.data().first() == Some(register);
         let frames = came.iter().filter(of_register).count() as u64;
         let (fewest, most) = all.bounds(cycle)?;
         let name = Register::of(*register).name;

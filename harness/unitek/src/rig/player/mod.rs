@@ -21,8 +21,8 @@ use worlds::{BESIDE_THE_BUS, STANDSTILL, Shown, Told};
 
 use super::Axis;
 use super::known::Known;
-use super::observed::{FrameNotes, Observed, Written};
-use super::profile::Profiled;
+use super::observed::{FrameNotes, Observed, WrittenRegisters};
+use super::profile::ProfileSettings;
 use super::set_back::foretell;
 use crate::driver::Error;
 use crate::gate::GuardsSegment as _;
@@ -85,7 +85,7 @@ struct Rehearsal {
 }
 
 /// How an attempt went, before it is judged.
-enum Gone {
+enum AttemptCourse {
     /// A drive did not become ready.
     Unanswered(Error),
     Skipped(Skip),
@@ -105,13 +105,13 @@ pub(crate) struct Player {
     /// Whether its adapter carries remote frames.
     remote: bool,
     /// What the rig's file says of the drives, unless they are qualified.
-    profile: Profiled,
+    profile: ProfileSettings,
     /// Known from the first attempt on.
     known: Option<Vec<Known>>,
     /// What was found out where finding out has failed.
     partly: Vec<Known>,
     /// What has been written since the registers were read.
-    written: Written,
+    written: WrittenRegisters,
     /// The levels of the EEPROM that the last attempt may have stored, with the drives.
     levels: BTreeSet<(u16, u16)>,
     /// Whether something that was played may have stored parameters.
@@ -144,7 +144,7 @@ impl Player {
             limits,
             capabilities,
             remote,
-            profile: Profiled::default(),
+            profile: ProfileSettings::default(),
             known: None,
             partly: Vec::new(),
             written: BTreeSet::new(),
@@ -159,8 +159,7 @@ impl Player {
         }
     }
 
-    /// Takes the properties of drives over from a profile.
-    pub(super) fn with_profile(mut self, profile: Profiled) -> Self {
+    pub(super) fn with_profile(mut self, profile: ProfileSettings) -> Self {
         self.profile = profile;
         self
     }
@@ -199,14 +198,13 @@ impl Player {
         &self.levels
     }
 
-    /// Remembers what was written.
     fn take_notes(&mut self, noted: &FrameNotes) {
         self.written.extend(&noted.written);
         self.levels.extend(noted.stored());
     }
 
     /// The registers that may differ from what was read at first.
-    pub(super) const fn written(&self) -> &Written {
+    pub(super) const fn written(&self) -> &WrittenRegisters {
         &self.written
     }
 
@@ -215,7 +213,6 @@ impl Player {
         self.stored
     }
 
-    /// Notes that parameters may have been stored.
     pub(super) const fn note_stored(&mut self) {
         self.stored = true;
     }
@@ -290,9 +287,9 @@ impl Player {
             tolerance: link.time_tolerance(),
         };
         let outcome = match gone {
-            Gone::Unanswered(error) => self.unanswered(&error),
-            Gone::Skipped(skip) => Outcome::skipped(skip),
-            Gone::Played(outcome, [drives, models], foretold) => {
+            AttemptCourse::Unanswered(error) => self.unanswered(&error),
+            AttemptCourse::Skipped(skip) => Outcome::skipped(skip),
+            AttemptCourse::Played(outcome, [drives, models], foretold) => {
                 let unlike = unlike(&drives, &models);
                 // What differs at rest does so in each attempt: it is judged where a conversation asks for it.
                 let asks = match scenario.name.starts_with(CONVERSATION) {
@@ -341,12 +338,12 @@ impl Player {
     }
 
     /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
-    fn go(&mut self, scenario: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
+    fn go(&mut self, scenario: &Own, link: &mut Observed<'_>, rehearses: bool) -> AttemptCourse {
         self.before = None;
         self.levels.clear();
         if let Err(error) = self.learn(link) {
             self.take_notes(&link.noted);
-            return Gone::Unanswered(error);
+            return AttemptCourse::Unanswered(error);
         }
         let scenario = &scenario.with_firmware(self.known());
         let real = link.time_tolerance() > Span::ZERO;
@@ -361,7 +358,7 @@ impl Player {
                 );
                 (rehearsal.at_rest, rehearsal.outcome.unmet)
             }),
-            Err(skip) => return Gone::Skipped(skip),
+            Err(skip) => return AttemptCourse::Skipped(skip),
         };
         outlast(link);
         link.noted.exchange.begin(Instant::START);
@@ -370,7 +367,7 @@ impl Player {
         self.take_notes(&link.noted);
         let at_rest = match at_rest {
             Ok(at_rest) => at_rest,
-            Err(error) => return Gone::Unanswered(error),
+            Err(error) => return AttemptCourse::Unanswered(error),
         };
         if scenario.may_time_out(self.known()) {
             link.without_pauses();
@@ -416,7 +413,7 @@ impl Player {
             while link.receive(0).is_some() {}
         }
         self.take_notes(&link.noted);
-        Gone::Played(Box::new(outcome), [at_rest, model], foretold)
+        AttemptCourse::Played(Box::new(outcome), [at_rest, model], foretold)
     }
 
     /// Plays a scenario on the model.
@@ -529,7 +526,6 @@ impl Player {
         })
     }
 
-    /// Plays a scenario on the model within limits.
     fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
@@ -591,7 +587,6 @@ fn outlast(link: &mut Observed<'_>) {
     }
 }
 
-/// Whether the profiles have different values of a property.
 fn differs_between_profiles(property: &harness_proto::unitek::properties::Description) -> bool {
     let profiles = PROFILES.iter().filter_map(|name| Properties::profile(name));
     let values = profiles.map(|profile| property.of_drive(&profile));

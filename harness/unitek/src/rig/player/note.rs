@@ -6,7 +6,7 @@
 use super::super::known::Known;
 use super::super::observed::Observed;
 use super::worlds::Told;
-use super::{Gone, Own, Player};
+use super::{AttemptCourse, Own, Player};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
 use crate::gate::guarded;
@@ -46,7 +46,7 @@ pub(crate) struct DriveNote {
     begun: Player,
     /// What was known of the drives in it.
     drives: Vec<Known>,
-    shown: Shown,
+    shown: AttemptShown,
     /// Its frames and their times, where time is real or they alone judge.
     told: Option<Told>,
     /// Whether no right drive could have sent them then.
@@ -55,7 +55,7 @@ pub(crate) struct DriveNote {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Shown {
+struct AttemptShown {
     /// Why the drives were not ready.
     unanswered: Option<Error>,
     /// How it ended, and at which place of the text.
@@ -66,8 +66,8 @@ struct Shown {
     within: BTreeMap<String, Vec<String>>,
 }
 
-impl Shown {
-    fn of(gone: &Gone, link: &Observed<'_>, exact: bool) -> Self {
+impl AttemptShown {
+    fn of(gone: &AttemptCourse, link: &Observed<'_>, exact: bool) -> Self {
         let [before, frames] = link.noted.kept();
         let before = before.iter().map(|frame| meaning(frame, false));
         let mut within: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -78,9 +78,9 @@ impl Shown {
             }
         }
         let (unanswered, ended) = match gone {
-            Gone::Unanswered(error) => (Some(error.clone()), None),
-            Gone::Skipped(_) => (None, None),
-            Gone::Played(outcome, ..) => {
+            AttemptCourse::Unanswered(error) => (Some(error.clone()), None),
+            AttemptCourse::Skipped(_) => (None, None),
+            AttemptCourse::Played(outcome, ..) => {
                 let place = outcome.finding.as_ref().map(|finding| finding.span.start);
                 (None, Some((outcome.verdict, place)))
             }
@@ -254,11 +254,11 @@ impl DriveNote {
         let gone = match self.noted.was_tried() {
             true => player.go(&self.own, &mut link, false),
             false => match player.learn(&mut link) {
-                Ok(()) => Gone::Skipped(Why::RunEnded.into()),
-                Err(error) => Gone::Unanswered(error),
+                Ok(()) => AttemptCourse::Skipped(Why::RunEnded.into()),
+                Err(error) => AttemptCourse::Unanswered(error),
             },
         };
-        Shown::of(&gone, &link, self.noted.exact) == self.shown
+        AttemptShown::of(&gone, &link, self.noted.exact) == self.shown
     }
 }
 
@@ -378,7 +378,7 @@ impl Player {
         begun: Self,
         scenario: &Arc<Own>,
         link: &Observed<'_>,
-        gone: &Gone,
+        gone: &AttemptCourse,
     ) {
         let drives = self.known.as_ref().unwrap_or(&self.partly).iter();
         let first = begun.known.is_none();
@@ -388,7 +388,7 @@ impl Player {
             false => known.clone(),
         });
         let exact = link.time_tolerance() == Span::ZERO;
-        let shown = Shown::of(gone, link, exact);
+        let shown = AttemptShown::of(gone, link, exact);
         let note = DriveNote {
             own: Arc::clone(scenario),
             begun,

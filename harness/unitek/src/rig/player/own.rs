@@ -57,7 +57,6 @@ impl Own {
         })
     }
 
-    /// The frames that its lines send.
     pub(in super::super) fn frames(&self) -> impl Iterator<Item = &Frame> {
         self.plan.steps.iter().flat_map(|step| match &step.action {
             PlannedAction::Send(_, frames) => frames.as_slice(),
@@ -198,12 +197,10 @@ fn asks(step: &Step) -> Vec<u8> {
     }
 }
 
-/// Whether a frame may store parameters in the EEPROM.
 pub(in super::super) fn stores(frame: &Frame) -> bool {
     writes(frame, 0x84)
 }
 
-/// Whether a frame writes a register.
 fn writes(frame: &Frame, number: u8) -> bool {
     let rx = u16::try_from(frame.id().number()).unwrap_or(0);
     let request = Request::decode(frame, rx, Dlc4::As3);

@@ -53,7 +53,7 @@ const INPUT_BITS: u32 = 0x003F;
 const INPUTS: std::ops::RangeInclusive<u8> = 0xE4..=0xE8;
 
 /// A frame that came: when it was on the bus by its stamp, and when it was read.
-pub(super) type Came = (Instant, Instant, Frame);
+pub(super) type TimedFrame = (Instant, Instant, Frame);
 
 /// The frames of an attempt, and what is known of their times.
 #[derive(Clone, Debug)]
@@ -329,7 +329,11 @@ impl Player {
     ///
     /// # Errors
     /// Why that is not known.
-    fn came_from(&self, known: &Known, talk: &Exchange) -> Result<(Vec<Came>, bool), &'static str> {
+    fn came_from(
+        &self,
+        known: &Known,
+        talk: &Exchange,
+    ) -> Result<(Vec<TimedFrame>, bool), &'static str> {
         let axis = known.axis;
         let [receives, sends] = identifiers(axis, talk);
         let others = self.axes.iter().filter(|other| **other != axis);

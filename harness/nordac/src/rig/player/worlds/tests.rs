@@ -58,11 +58,11 @@ fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
 }
 
 /// Whether right slaves send this over a line that loses at most `most_lost` telegrams.
-fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usize>, Differs> {
+fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usize>, Divergence> {
     right_slaves_send(known, BusRate::K500, most_lost, turns, &Beats::default())
 }
 
-fn judged(turns: &[Turn]) -> Result<(), Differs> {
+fn judged(turns: &[Turn]) -> Result<(), Divergence> {
     sent_by(&[known(&[])], 0, turns).map(|_| ())
 }
 
