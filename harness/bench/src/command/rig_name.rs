@@ -53,13 +53,18 @@ pub struct Use {
 }
 
 impl Use {
-    /// For a command that changes nothing.
-    pub const fn look(purpose: &'static str) -> Self {
+    /// For the command of this name.
+    pub const fn new(purpose: &'static str, moves: bool, holds: bool) -> Self {
         Self {
             purpose,
-            moves: false,
-            holds: true,
+            moves,
+            holds,
         }
+    }
+
+    /// For a command that changes nothing.
+    pub const fn look(purpose: &'static str) -> Self {
+        Self::new(purpose, false, true)
     }
 
     /// Whether it changes nothing, so that a failure leaves the drives as they are.

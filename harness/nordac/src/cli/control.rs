@@ -63,11 +63,7 @@ pub(super) fn go(
             "an inverter is switched on as long as words are exchanged: use `on` with --for or --hold; `go` is for a session (`shell`)",
         ));
     }
-    let as_what = Use {
-        purpose: "go",
-        moves: arguments.leave,
-        holds: false,
-    };
+    let as_what = Use::new("go", arguments.leave, false);
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
         let slaves = harness_bench::command::port_bench::select(&select.drives, session)?;
@@ -117,11 +113,7 @@ pub(super) fn exchange(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let steps = steps(&arguments.words).map_err(Failure::refused)?;
-    let as_what = Use {
-        purpose: "exchange",
-        moves: arguments.leave,
-        holds: false,
-    };
+    let as_what = Use::new("exchange", arguments.leave, false);
     with(bench, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
         let longest = longest_hold(session);
@@ -228,11 +220,7 @@ pub(super) fn on(
     arguments: &OnArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        purpose: "on",
-        moves: arguments.leave,
-        holds: false,
-    };
+    let as_what = Use::new("on", arguments.leave, false);
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
         let slaves = harness_bench::command::port_bench::select(&select.drives, session)?;
@@ -264,10 +252,7 @@ pub(super) fn stop(
     arguments: &SelectArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        moves: true,
-        ..Use::look(purpose)
-    };
+    let as_what = Use::new(purpose, true, true);
     with(bench, &arguments.rig, as_what, output, |session, output| {
         each(session, &arguments.drives, output, |driver, slave| {
             driver.join(slave)?;
@@ -281,10 +266,7 @@ pub(super) fn acknowledge(
     arguments: &AcknowledgeArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        moves: arguments.leave,
-        ..Use::look("acknowledge")
-    };
+    let as_what = Use::new("acknowledge", arguments.leave, true);
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
         let slaves = harness_bench::command::port_bench::select(&select.drives, session)?;

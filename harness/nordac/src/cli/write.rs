@@ -23,11 +23,7 @@ pub(super) fn write(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let orders = assignments(&arguments.values).map_err(Failure::refused)?;
-    let as_what = Use {
-        purpose: "write",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let as_what = Use::new("write", arguments.leave, arguments.hold.hold);
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);

@@ -28,11 +28,7 @@ pub(super) fn go(
     arguments: &MoveArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        purpose: "go",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let as_what = Use::new("go", arguments.leave, arguments.hold.hold);
     let select = &arguments.select;
     on(bench, &select.rig, as_what, output, |session, output| {
         let drives = harness_bench::command::port_bench::select(&select.drives, session)?;
@@ -70,10 +66,7 @@ pub(super) fn stop(
     arguments: &SelectArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        moves: true,
-        ..Use::look("stop")
-    };
+    let as_what = Use::new("stop", true, true);
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(&arguments.drives, session)?;
         each(session, &drives, output, |driver, axis| {
@@ -114,10 +107,7 @@ pub(super) fn delete_error(
     arguments: &DeleteErrorArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let as_what = Use {
-        moves: arguments.leave,
-        ..Use::look("delete-error")
-    };
+    let as_what = Use::new("delete-error", arguments.leave, true);
     let select = &arguments.select;
     on(bench, &select.rig, as_what, output, |session, output| {
         let drives = harness_bench::command::port_bench::select(&select.drives, session)?;

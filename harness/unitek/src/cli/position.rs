@@ -38,11 +38,7 @@ pub(super) fn position(
             "--init and --speed are for rings of ND21; the speed of a UNITEK drive is bounded by SPEED_LIMIT (0x34)",
         ));
     }
-    let as_what = Use {
-        purpose: "position",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let as_what = Use::new("position", arguments.leave, arguments.hold.hold);
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let axis = single::<UnitekDrives>(&arguments.drive, session)?;
         if !arguments.leave {

@@ -30,11 +30,7 @@ pub(super) fn write(
         .map(|text| assignment(text))
         .collect::<Result<Vec<_>, _>>();
     let values = values.map_err(Failure::refused)?;
-    let as_what = Use {
-        purpose: "write",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let as_what = Use::new("write", arguments.leave, arguments.hold.hold);
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = session.driver();
