@@ -36,7 +36,7 @@ impl LineGate {
     fn admit_all(&mut self, now: Instant, octets: &[u8]) -> Result<(), Denied> {
         if self.listen_only && !octets.is_empty() {
             let why = "nothing is sent: the rig's file says `listen_only = true`".to_owned();
-            return Err(never(why));
+            return Err(Denied::never(why));
         }
         let mut gate = self.gate.clone();
         for octet in octets {
@@ -79,19 +79,11 @@ impl LineGate {
     }
 }
 
-/// A denial that no setting lifts.
-const fn never(why: String) -> Denied {
-    Denied {
-        why,
-        settings: Vec::new(),
-    }
-}
-
 impl Gate for LineGate {
     fn admit(&mut self, now: Instant, what: Out<'_>) -> (usize, Option<Denied>) {
         if !what.frames().is_empty() {
             let why = "frames are not sent: this bus carries octets".to_owned();
-            return (0, Some(never(why)));
+            return (0, Some(Denied::never(why)));
         }
         match self.admit_all(now, what.octets()) {
             Ok(()) => (what.len(), None),

@@ -47,7 +47,7 @@ impl SegmentGate {
     fn admit_frame(&mut self, now: Instant, frame: &Frame) -> Result<(), Denied> {
         if self.listen_only {
             let why = format!("{frame} is not sent: the rig's file says `listen_only = true`");
-            return Err(never(why));
+            return Err(Denied::never(why));
         }
         let judged = self.gate.admit(now, frame);
         judged.map_err(|denial| Denied {
@@ -78,16 +78,8 @@ impl SegmentGate {
     }
 }
 
-/// A denial that no setting lifts.
-const fn never(why: String) -> Denied {
-    Denied {
-        why,
-        settings: Vec::new(),
-    }
-}
-
 fn no_octets() -> Denied {
-    never("octets are not sent: a CAN bus carries frames".to_owned())
+    Denied::never("octets are not sent: a CAN bus carries frames".to_owned())
 }
 
 impl Gate for SegmentGate {

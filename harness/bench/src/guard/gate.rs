@@ -19,6 +19,16 @@ pub struct Denied {
     pub settings: Vec<LimitSetting>,
 }
 
+impl Denied {
+    /// A denial that no setting lifts.
+    pub const fn never(why: String) -> Self {
+        Self {
+            why,
+            settings: Vec::new(),
+        }
+    }
+}
+
 /// The rules of one port. Decides piece by piece what may be sent, by how a drive would read it.
 ///
 /// Times are those of the guard, which are never set back.

@@ -306,10 +306,7 @@ impl<L: Line> Guarded<L> {
 
 /// The denial of what would go through a port that the rig's file does not have.
 fn no_port(port: usize) -> Denied {
-    Denied {
-        why: format!("ring {} is not in the rig's file", port + 1),
-        settings: Vec::new(),
-    }
+    Denied::never(format!("ring {} is not in the rig's file", port + 1))
 }
 
 impl<L: Line> Line for Guarded<L> {
