@@ -47,16 +47,16 @@ pub(super) fn act(
         }
         PlannedAct::Power(slave, on) => {
             let fault = if *on { DriveFault::On } else { DriveFault::Off };
-            happen(runner, now, &[PlacedFault::Drive(*slave, fault)]);
+            runner.happen(now, &[PlacedFault::Drive(*slave, fault)]);
         }
         PlannedAct::Restart(slave) => {
             let faults = [DriveFault::Off, DriveFault::On];
             let faults = faults.map(|fault| PlacedFault::Drive(*slave, fault));
-            happen(runner, now, &faults);
+            runner.happen(now, &faults);
         }
         PlannedAct::Outside(slave, stimulus) => {
             let what = AnyStimulus::Nordac(*stimulus);
-            happen(runner, now, &[PlacedFault::Stimulus(*slave, what)]);
+            runner.happen(now, &[PlacedFault::Stimulus(*slave, what)]);
         }
         PlannedAct::Quiet => {
             runner.settle();
@@ -71,17 +71,6 @@ pub(super) fn act(
         PlannedAct::Job(slave, job) => jobs::play(runner, span, *slave, job)?,
     }
     Ok(())
-}
-
-/// What happens to a slave. Without a time in front of the line it happens when everything that was sent has left and is answered.
-fn happen(runner: &mut Runner<'_, Nordac>, settles: bool, faults: &[PlacedFault]) {
-    if settles {
-        runner.settle();
-    }
-    for fault in faults {
-        runner.link.inject(0, *fault, Moment::Now);
-    }
-    runner.line_before = runner.line_before.max(runner.link.now());
 }
 
 /// A parameter beside the bus; over the bus where the inverter cannot be seen.

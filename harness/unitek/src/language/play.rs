@@ -221,7 +221,7 @@ pub(super) fn act(
                 DriveHarm::On => PlacedFault::Drive(*node, DriveFault::On),
                 DriveHarm::BusOff => from_outside(*node, unitek::Stimulus::BusOff),
             };
-            happen(runner, now, &[fault]);
+            runner.happen(now, &[fault]);
         }
         Act::Outside(node, unitek::Stimulus::Register(register, raw))
             if runner.link.beside().is_none() =>
@@ -230,14 +230,10 @@ pub(super) fn act(
                 runner.transmit(0, &[frame]);
             }
         }
-        Act::Outside(node, stimulus) => happen(runner, now, &[from_outside(*node, *stimulus)]),
+        Act::Outside(node, stimulus) => runner.happen(now, &[from_outside(*node, *stimulus)]),
         Act::Restart(node) => {
             let faults = [DriveFault::Off, DriveFault::On];
-            happen(
-                runner,
-                now,
-                &faults.map(|fault| PlacedFault::Drive(*node, fault)),
-            );
+            runner.happen(now, &faults.map(|fault| PlacedFault::Drive(*node, fault)));
         }
         Act::Quiet => {
             runner.settle();
@@ -277,17 +273,6 @@ fn over_bus(runner: &Runner<'_, Unitek>, node: u8, register: u8, raw: u32) -> Op
     let data = Data::of(Register::of(register), raw);
     let request = Request::Write { register, data };
     request.encode(setup.identifiers.0).ok()
-}
-
-/// What happens to a drive. Without a time in front of the line it happens when everything that was sent has left and is answered.
-fn happen(runner: &mut Runner<'_, Unitek>, settles: bool, faults: &[PlacedFault]) {
-    if settles {
-        runner.settle();
-    }
-    for fault in faults {
-        runner.link.inject(0, *fault, Moment::Now);
-    }
-    runner.line_before = runner.line_before.max(runner.link.now());
 }
 
 /// A register beside the bus; over the bus where the drive cannot be seen.

@@ -3,7 +3,7 @@
 use super::halt::Halt;
 use super::outcome::{Outcome, Stop};
 use super::skip::lacks;
-use crate::link::{Capability, Link};
+use crate::link::{Capability, Link, Moment, PlacedFault};
 use crate::scenario::language::Language;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
 use crate::scenario::problem::TextSpan;
@@ -255,6 +255,17 @@ impl<L: Language> Runner<'_, L> {
         if !self.link.busy() {
             self.link.pause();
         }
+    }
+
+    /// Injects faults, or what happens to drives, at once; where it `settles`, when everything that was sent has left and is answered.
+    pub fn happen(&mut self, settles: bool, faults: &[PlacedFault]) {
+        if settles {
+            self.settle();
+        }
+        for fault in faults {
+            self.link.inject(0, *fault, Moment::Now);
+        }
+        self.line_before = self.line_before.max(self.link.now());
     }
 
     /// Lets time pass until everything that was sent has returned or is lost.
