@@ -4,17 +4,17 @@
 //! begin no telegram, and those of one that does not go on, leave as they came.
 
 use super::language::Nordac;
-use super::language::now::{StepError, now};
+use super::language::now::{ONLY, now};
 use super::live::Recorder;
 use super::simulate::Bench;
 use harness_bench::counted::counted;
 use harness_bench::medium::ErrorMarks;
-use harness_bench::scenario::parse::header::{Part, parse_step, read};
-use harness_bench::scenario::plan::{Plan, plan as settle, plan_step};
+use harness_bench::scenario::parse::header::{Part, read};
+use harness_bench::scenario::plan::{Plan, plan as settle};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
-use harness_bench::serve::{ControlAnswer, ServedBus, first};
+use harness_bench::serve::{ControlAnswer, ServedBus, step_at_once};
 use harness_bench::web::LiveView;
 use harness_proto::decode::Decoded;
 use harness_proto::line::{LineError, Received};
@@ -376,16 +376,9 @@ impl ServedBus for SegmentServer {
             Ok(source) => source,
             Err(error) => return Some(ControlAnswer::Error(error.to_string())),
         };
-        let step =
-            parse_step::<Nordac>(&source).and_then(|step| plan_step(&self.plan, &step, &source));
-        Some(match step {
-            Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
-            Ok(step) => match now(&mut self.bench, &step) {
-                Ok(()) => ControlAnswer::Ok,
-                Err(StepError::Otherwise(found)) => ControlAnswer::No(found),
-                Err(StepError::Refused(why)) => ControlAnswer::Error(why.to_owned()),
-            },
-        })
+        let bench = &mut self.bench;
+        let act = |act: &_, span| now(bench, act, span);
+        Some(step_at_once(&source, &self.plan, ONLY, act))
     }
 
     fn remarks(&mut self) -> Vec<String> {

@@ -1,16 +1,18 @@
 //! Simulated UNITEK drives that clients share, in real time.
 
 use super::language::Unitek;
-use super::language::now::{StepError, now};
+use super::language::now::{ONLY, now};
 use super::simulate::{Bench, DriveSetup, Setup};
 use harness_bench::counted::counted;
-use harness_bench::scenario::parse::header::{Part, parse_step, read};
-use harness_bench::scenario::plan::{Plan, plan as settle, plan_step};
+use harness_bench::scenario::parse::header::{Part, read};
+use harness_bench::scenario::plan::{Plan, plan as settle};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::serve::frames::{FramePlace, MOST_CLIENTS, SharedBus, serve_frames};
-use harness_bench::serve::{ControlAnswer, ServeEnd, ServeError, ServeHost, ServeOptions, first};
+use harness_bench::serve::{
+    ControlAnswer, ServeEnd, ServeError, ServeHost, ServeOptions, step_at_once,
+};
 use harness_bench::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
@@ -160,16 +162,9 @@ impl SharedBus for SharedDrives {
                     .map_or_else(ControlAnswer::Error, ControlAnswer::State),
             );
         }
-        let step =
-            parse_step::<Unitek>(&source).and_then(|step| plan_step(&self.plan, &step, &source));
-        Some(match step {
-            Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
-            Ok(step) => match now(&mut self.bench, &step) {
-                Ok(()) => ControlAnswer::Ok,
-                Err(StepError::Otherwise(found)) => ControlAnswer::No(found),
-                Err(StepError::Refused(why)) => ControlAnswer::Error(why.to_owned()),
-            },
-        })
+        let bench = &mut self.bench;
+        let act = |act: &_, span| now(bench, act, span);
+        Some(step_at_once(&source, &self.plan, ONLY, act))
     }
 
     fn live(&mut self) -> &mut dyn LiveView {

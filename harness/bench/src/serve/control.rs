@@ -1,6 +1,10 @@
 //! Answers to lines of control, which act on a served bus beside the client, in the words of the scenario language.
 
-use crate::scenario::problem::Problems;
+use crate::scenario::language::Language;
+use crate::scenario::parse::parse_step;
+use crate::scenario::plan::{Plan, PlannedAction, PlannedWhen, plan_step};
+use crate::scenario::problem::{Problems, TextSpan};
+use crate::scenario::source::Source;
 use std::fmt;
 
 /// The answer to a line of control. As a text it is one line without its end.
@@ -24,6 +28,27 @@ impl fmt::Display for ControlAnswer {
             Self::No(found) => write!(f, "no: {found}"),
             Self::Error(why) => write!(f, "error: {why}"),
         }
+    }
+}
+
+/// Does a step of a scenario at once. `act` does one of this bus, or says why not; `only` names what can be done, for any other step.
+pub fn step_at_once<L: Language>(
+    source: &Source,
+    plan: &Plan<L>,
+    only: &str,
+    act: impl FnOnce(&L::Act, TextSpan) -> Result<(), ControlAnswer>,
+) -> ControlAnswer {
+    let step = parse_step::<L>(source).and_then(|step| plan_step(plan, &step, source));
+    match step {
+        Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
+        Ok(step) if step.when != PlannedWhen::Now => {
+            let why = "a line is carried out at once: no time is allowed in front of it";
+            ControlAnswer::Error(why.to_owned())
+        }
+        Ok(step) => match &step.action {
+            PlannedAction::Own(own) => act(own, step.span).err().unwrap_or(ControlAnswer::Ok),
+            _ => ControlAnswer::Error(only.to_owned()),
+        },
     }
 }
 

@@ -17,8 +17,7 @@ pub mod stage;
 pub mod tcp;
 mod thread;
 
-pub use control::ControlAnswer;
-pub use control::first;
+pub use control::{ControlAnswer, first, step_at_once};
 pub use place::{ClientRole, ControlPlace, Inner, Pace, ServedAt};
 pub use served::ServedBus;
 pub use shell::{EndRequest, serve_until};

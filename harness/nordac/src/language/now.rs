@@ -1,33 +1,21 @@
 //! Steps that are done at once, beside the conversations of other masters.
 
-use super::Nordac;
 use super::plan::PlannedAct;
 use crate::simulate::Bench;
 use harness_bench::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
-use harness_bench::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum StepError {
-    /// A check does not hold: what was found.
-    Otherwise(String),
-    /// It cannot be done at once: why.
-    Refused(&'static str),
-}
+use harness_bench::scenario::problem::TextSpan;
+use harness_bench::serve::ControlAnswer;
 
 /// Does a step at once. No time passes and nothing is sent: faults, what happens to slaves from outside the bus, and checks of parameters. If the
 /// octet or the telegram of a fault has passed, the next one of all stations is meant.
 ///
 /// # Errors
-/// [`StepError`].
-pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), StepError> {
-    if step.when != PlannedWhen::Now {
-        return Err(StepError::Refused(
-            "a line is carried out at once: no time is allowed in front of it",
-        ));
-    }
-    let PlannedAction::Own(act) = &step.action else {
-        return Err(StepError::Refused(ONLY));
-    };
+/// The check does not hold, or the step cannot be done at once.
+pub(crate) fn now(
+    bench: &mut Bench,
+    act: &PlannedAct,
+    span: TextSpan,
+) -> Result<(), ControlAnswer> {
     match act {
         PlannedAct::Fault(placed) => {
             let placed = bench.not_passed(*placed);
@@ -51,15 +39,17 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), S
             let found = bench.parameter(*slave, parameter.known, parameter.index);
             let found = found.and_then(|found| parameter.known?.raw_of(found));
             let found = found.ok_or_else(|| {
-                StepError::Otherwise(format!("slave {slave} has no {}", parameter.name()))
+                ControlAnswer::No(format!("slave {slave} has no {}", parameter.name()))
             })?;
-            let compared = parameter.compare(step.span, found, *raw);
-            compared.map_err(|stop| StepError::Otherwise(stop.into_message()))?;
+            let compared = parameter.compare(span, found, *raw);
+            compared.map_err(|stop| ControlAnswer::No(stop.into_message()))?;
         }
-        PlannedAct::Quiet | PlannedAct::Job(..) => return Err(StepError::Refused(ONLY)),
+        PlannedAct::Quiet | PlannedAct::Job(..) => {
+            return Err(ControlAnswer::Error(ONLY.to_owned()));
+        }
     }
     Ok(())
 }
 
-const ONLY: &str = "only faults (`!`), checks of parameters (`? slave 8 parameter ...`) and what happens to slaves (`slave ...`) can be done at \
+pub(crate) const ONLY: &str = "only faults (`!`), checks of parameters (`? slave 8 parameter ...`) and what happens to slaves (`slave ...`) can be done at \
                     once: the telegrams are the clients'";
