@@ -11,15 +11,15 @@ pub(super) use telegram::message;
 use super::syntax::{Header, OctetHarm, Sender, SlaveLine, TelegramHarm, TelegramStep};
 use harness_bench::scenario::expression;
 use harness_bench::scenario::language::Opening;
-use harness_bench::scenario::parse::header::once;
+use harness_bench::scenario::parse::header::{deviating_master, once};
 use harness_bench::scenario::parse::step::{behind_the_first, header_too_late};
-use harness_bench::scenario::parse::words::{deviation, named, required};
+use harness_bench::scenario::parse::words::{named, required};
 use harness_bench::scenario::problem::{Problem, Spanned, TextSpan};
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::times;
 use harness_proto::profibus::BusRate;
 use harness_sim::fault::LinkFault;
-use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, MasterDeviation};
+use harness_sim::nordac::deviation::MASTER_DEVIATIONS;
 use harness_sim::octet_segment::TelegramFault;
 
 /// Words with which header lines of this bus begin.
@@ -75,24 +75,9 @@ fn master(
     header: &mut Header,
     begun: bool,
 ) -> Result<(), Problem> {
-    if begun {
-        let problem = behind_the_first(word.span, "master deviates");
-        return Err(problem.help("move the line up, above the first step"));
-    }
-    required(scanner, &["deviates"])?;
-    let here = scanner.here();
-    let names: Vec<(&str, &'static MasterDeviation)> = MASTER_DEVIATIONS
-        .iter()
-        .map(|deviation| (deviation.name, deviation))
-        .collect();
-    let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
-    let span = scanner.since(here);
-    scanner.expect_end()?;
-    let name = Spanned {
-        value: "master deviates",
-        span: word.span,
-    };
-    once(&mut header.master, Spanned { value, span }, &name)
+    let names = MASTER_DEVIATIONS.iter().map(|wrong| (wrong.name, wrong));
+    let names: Vec<_> = names.collect();
+    deviating_master(word, scanner, &mut header.master, begun, &names)
 }
 
 /// A line that begins with `slave` is a header line where it can be one.

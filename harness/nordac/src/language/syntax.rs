@@ -2,7 +2,7 @@
 
 use harness_bench::scenario::expression::Located;
 use harness_bench::scenario::pattern::Pattern;
-use harness_bench::scenario::problem::{Spanned, TextSpan};
+use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::times::Duration;
 use harness_proto::nordac::properties::Description;
 use harness_proto::nordac::{Parameter, PpoType};
@@ -16,7 +16,7 @@ pub(crate) struct Header {
     /// `rate 500`, in kbit/s.
     pub(crate) rate: Option<BusRate>,
     /// `master deviates NAME`.
-    pub(crate) master: Option<Spanned<&'static MasterDeviation>>,
+    pub(crate) master: Option<&'static MasterDeviation>,
     /// Lines about slaves, in order.
     pub(crate) slaves: Vec<SlaveLine>,
 }

@@ -17,8 +17,8 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
         let blank = if what.is_empty() { "" } else { " " };
         format!("slave {}{blank}{what}", line.slave.expression)
     });
-    let master = header.master.as_ref();
-    let master = master.map(|deviation| format!("master deviates {}", deviation.value.name));
+    let master = header.master.iter();
+    let master = master.map(|wrong| format!("master deviates {}", wrong.name));
     (rate.into_iter().collect(), slaves.chain(master).collect())
 }
 

@@ -13,14 +13,14 @@ pub(super) use value::register_of_force;
 use super::syntax::{DriveHarm, FrameHarm, FrameStep, Header, SetupKind};
 use harness_bench::scenario::expression;
 use harness_bench::scenario::language::Opening;
-use harness_bench::scenario::parse::header::once;
+use harness_bench::scenario::parse::header::{deviating_master, once};
 use harness_bench::scenario::parse::step::{behind_the_first, header_too_late};
-use harness_bench::scenario::parse::words::{deviation, named, required};
+use harness_bench::scenario::parse::words::{named, required};
 use harness_bench::scenario::problem::{Problem, Spanned, TextSpan};
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::times;
 use harness_proto::can::BitRate;
-use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, MasterDeviation};
+use harness_sim::unitek::deviation::MASTER_DEVIATIONS;
 
 /// Words with which header lines of this bus begin.
 pub(super) const HEADER: [&str; 2] = ["rate", "drive"];
@@ -38,7 +38,9 @@ pub(super) fn header(
     match word.value {
         "rate" if begun => Some(Err(header_too_late(word.span, word.value))),
         "rate" => Some(rate(scanner).and_then(|rate| once(&mut header.rate, rate, word))),
-        "master" if scanner.eat_word("deviates") => Some(master(word, scanner, header, begun)),
+        "master" if scanner.clone().eat_word("deviates") => {
+            Some(master(word, scanner, header, begun))
+        }
         "drive" => drive_line(word, scanner, header, begun),
         _ => None,
     }
@@ -78,23 +80,9 @@ fn master(
     header: &mut Header,
     begun: bool,
 ) -> Result<(), Problem> {
-    if begun {
-        let problem = behind_the_first(word.span, "master deviates");
-        return Err(problem.help("move the line up, above the first step"));
-    }
-    let here = scanner.here();
-    let names: Vec<(&str, &'static MasterDeviation)> = MASTER_DEVIATIONS
-        .iter()
-        .map(|deviation| (deviation.name, deviation))
-        .collect();
-    let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
-    let span = scanner.since(here);
-    scanner.expect_end()?;
-    let name = Spanned {
-        value: "master deviates",
-        span: word.span,
-    };
-    once(&mut header.master, Spanned { value, span }, &name)
+    let names = MASTER_DEVIATIONS.iter().map(|wrong| (wrong.name, wrong));
+    let names: Vec<_> = names.collect();
+    deviating_master(word, scanner, &mut header.master, begun, &names)
 }
 
 /// A line that begins with `drive` is a header line where it can be one.

@@ -119,7 +119,7 @@ pub(super) fn settle(
     Ok(resume(&Setup {
         rate,
         drives,
-        master: header.master.as_ref().map(|deviation| deviation.value),
+        master: header.master,
     }))
 }
 

@@ -2,7 +2,7 @@
 
 use harness_bench::scenario::expression::Located;
 use harness_bench::scenario::pattern::Pattern;
-use harness_bench::scenario::problem::{Spanned, TextSpan};
+use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::times::Duration;
 use harness_proto::can::{BitRate, Id};
 use harness_proto::unitek::Register;
@@ -18,7 +18,7 @@ pub(crate) struct Header {
     /// Lines about drives, in order.
     pub(crate) drives: Vec<DriveLine>,
     /// `master deviates NAME`.
-    pub(crate) master: Option<Spanned<&'static MasterDeviation>>,
+    pub(crate) master: Option<&'static MasterDeviation>,
 }
 
 #[derive(Clone, Debug)]

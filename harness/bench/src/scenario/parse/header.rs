@@ -1,7 +1,7 @@
 //! The header, and the lines one after another.
 
 use super::step;
-use super::words::named;
+use super::words::{deviation, named, required};
 use crate::bus_name::BusName;
 use crate::link::Capability;
 use crate::scenario::language::Language;
@@ -276,6 +276,31 @@ pub fn once<T>(place: &mut Option<T>, value: T, word: &Spanned<&str>) -> Result<
     }
     *place = Some(value);
     Ok(())
+}
+
+/// Reads a line `master deviates NAME` with one of these names, which may stand once, above the first step.
+///
+/// # Errors
+/// It names no deviation, or stands elsewhere or twice.
+pub fn deviating_master<T: Copy>(
+    word: &Spanned<&str>,
+    scanner: &mut Scanner<'_>,
+    place: &mut Option<T>,
+    begun: bool,
+    names: &[(&str, T)],
+) -> Result<(), Problem> {
+    let line = Spanned {
+        value: "master deviates",
+        span: word.span,
+    };
+    if begun {
+        let problem = step::behind_the_first(line.span, line.value);
+        return Err(problem.help("move the line up, above the first step"));
+    }
+    required(scanner, &["deviates"])?;
+    let value = deviation(scanner, names, "a master", "`master deviates NAME`")?;
+    scanner.expect_end()?;
+    once(place, value, &line)
 }
 
 /// A line that may be given once and is given twice.

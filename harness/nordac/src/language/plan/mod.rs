@@ -130,11 +130,10 @@ pub(super) fn settle(
         return Err(Problem::new(span, what, "as many `slave` lines expected"));
     }
     let rate = header.rate.unwrap_or_default();
-    let master = header.master.as_ref().map(|deviation| deviation.value);
     Ok(resume(&simulate::Setup {
         rate,
         slaves,
-        master,
+        master: header.master,
     }))
 }
 
