@@ -251,7 +251,7 @@ fn the_user_says_what_an_interface_is() {
     );
 }
 
-/// Frames of CAN that tcpdump captures at `any`: behind a header of 16 or 20 bytes that names the protocol. libpcap leaves the identifier in
+/// Frames of CAN that tcpdump captures at `any`: after a header of 16 or 20 bytes that names the protocol. libpcap leaves the identifier in
 /// the order of the computer, and other programs have that of networks.
 #[test]
 fn cooked_captures_of_can() {
@@ -361,7 +361,7 @@ fn pieces_of_an_adapter_are_joined() {
             all.differences
         );
     }
-    // Pieces that were read sooner behind each other than their octets take are not mixed.
+    // Pieces that were read sooner after each other than their octets take are not mixed.
     let mut near = pieces(&octets, 16);
     near.iter_mut()
         .zip(1..)

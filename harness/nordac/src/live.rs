@@ -106,7 +106,7 @@ pub(super) fn at_port(run: &TelegramRun, slaves: &[u8], reader: &mut Reader) -> 
     arrow(run, slaves, slaves.len() + 1, place, whole, at, reader)
 }
 
-/// A telegram from the column of its station to that of its receiver, or to all; slaves have the columns behind the first.
+/// A telegram from the column of its station to that of its receiver, or to all; slaves have the columns after the first.
 fn arrow(
     run: &TelegramRun,
     slaves: &[u8],
@@ -272,7 +272,7 @@ fn own_token(run: &TelegramRun) -> Option<u8> {
     }
 }
 
-/// The rows of telegrams, with a row behind them that counts the tokens which a master gave to itself.
+/// The rows of telegrams, with a row after them that counts the tokens which a master gave to itself.
 pub(super) fn without_tokens<'r>(
     rows: impl Iterator<Item = (LiveRow, &'r TelegramRun)>,
 ) -> Vec<LiveRow> {

@@ -299,7 +299,7 @@ impl Shutdown<'_, '_> {
             asked += 1;
             let off = status & OUTPUT == 0;
             off_for = if off { off_for + 1 } else { 0 };
-            // ZSW bit 4 repeats OFF2: what is seen is behind the word that was sent.
+            // ZSW bit 4 repeats OFF2: what is seen is after the word that was sent.
             let seen = off && status & zsw::NO_OFF2 == 0;
             if seen || off_for >= LAGGING {
                 let state = State::of_zsw(status).map_or("unknown", State::name);

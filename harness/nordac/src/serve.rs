@@ -1,6 +1,6 @@
 //! Simulated NORDAC inverters on a segment that clients share as masters, in real time.
 //!
-//! A stream has no idle times that count: a telegram of a client is known by its octets. It leaves behind 33 idle bits, without a gap. Octets that
+//! A stream has no idle times that count: a telegram of a client is known by its octets. It leaves after 33 idle bits, without a gap. Octets that
 //! begin no telegram, and those of one that does not go on, leave as they came.
 
 use super::language::Nordac;
@@ -81,7 +81,7 @@ const USUAL: u8 = 8;
 /// is 2 (1621), unless the header says another.
 ///
 /// # Errors
-/// The header has mistakes. Steps behind it are ignored.
+/// The header has mistakes. Steps after it are ignored.
 pub(crate) fn bench(
     addresses: Option<&[u8]>,
     header: Option<&Source>,

@@ -67,7 +67,7 @@ fn telegrams_are_known_by_their_octets() {
     assert_eq!(clients.heard(0), [PRESENT, PRESENT].concat());
 }
 
-/// What is no telegram is on the line as it came and is not answered; a telegram behind it is.
+/// What is no telegram is on the line as it came and is not answered; a telegram after it is.
 #[test]
 fn what_is_no_telegram_is_not_answered() {
     for garbage in [
@@ -125,7 +125,7 @@ fn marks_carry_parity_errors() {
     assert_eq!(clients.heard(0), PRESENT);
 }
 
-/// At 500 kbit/s a reply begins 11 bits behind its request, and 33 idle bits stand in front of the request.
+/// At 500 kbit/s a reply begins 11 bits after its request, and 33 idle bits stand in front of the request.
 #[test]
 fn times_are_those_of_the_line() {
     let mut clients = Clients::new(1, ErrorMarks::None);

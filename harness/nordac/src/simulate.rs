@@ -128,7 +128,7 @@ impl Bench {
         Self::with_guests(setup, 0)
     }
 
-    /// The same with this number of hosts more, behind the slaves.
+    /// The same with this number of hosts more, after the slaves.
     #[must_use]
     pub(super) fn with_guests(setup: &Setup, guests: usize) -> Self {
         let bench = Member::Host(LineHost::default());
@@ -152,7 +152,7 @@ impl Bench {
         &mut self.line
     }
 
-    /// A client's host: the first client has the bench's own place, the others are behind the slaves.
+    /// A client's host: the first client has the bench's own place, the others are after the slaves.
     pub(super) fn client(&mut self, client: usize) -> Option<&mut LineHost> {
         let place = match client {
             0 => BENCH,

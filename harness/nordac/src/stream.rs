@@ -225,7 +225,7 @@ impl PortLink for SegmentLink {
         self.pump.beats()
     }
 
-    /// One telegram behind the other, each with its idle time.
+    /// One telegram after the other, each with its idle time.
     fn last_words(&self) -> std::io::Result<Vec<LastWords>> {
         let ports = self.pump.last_words(telegrams)?;
         let apart = ports.into_iter().map(|words| words.after(LAST_WORDS_GAP));

@@ -163,7 +163,7 @@ pub(crate) struct Assignment {
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
 pub(crate) fn assignments(texts: &[String]) -> Result<Vec<Assignment>, String> {
-    // A space can stand anywhere in an assignment: the next one begins behind a value and its unit.
+    // A space can stand anywhere in an assignment: the next one begins after a value and its unit.
     let mut all: Vec<(String, Option<String>)> = Vec::new();
     for text in texts {
         let unfinished = match all.last_mut() {

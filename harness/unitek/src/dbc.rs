@@ -1,8 +1,8 @@
 //! A DBC file of drives on a CAN bus, for tools that decode frames by one.
 //!
 //! A drive has two messages: what the master sends to it (5 bytes) and what it sends (6 bytes). Byte 0 of each is the register, REGID, which
-//! selects the signals behind it. REGID 3D of the master's message reads a register; its next byte is which (`READ`), and the byte
-//! behind that the interval of the replies. There is one level of selectors and no `SG_MUL_VAL_` line, which many readers do not know.
+//! selects the signals after it. REGID 3D of the master's message reads a register; its next byte is which (`READ`), and the byte
+//! after that the interval of the replies. There is one level of selectors and no `SG_MUL_VAL_` line, which many readers do not know.
 //! A register is as wide as the drive keeps it, so a tool must accept shorter frames: the
 //! drive answers for a register of 16 bits with 4 bytes. A register whose bits have names is one signal a bit.
 
@@ -249,7 +249,7 @@ fn joined(register: &str, part: &str) -> String {
     format!("{}_{part}", &register[..register.len().min(room)])
 }
 
-/// The name of a register as an identifier: that of the dump. The number stands behind it where it would be the name of several registers,
+/// The name of a register as an identifier: that of the dump. The number stands after it where it would be the name of several registers,
 /// unless the dump prints it so for this one alone; and alone where the name has no letters.
 fn name(register: &Register) -> String {
     let plain = identifier(register.name);
@@ -271,7 +271,7 @@ fn name(register: &Register) -> String {
     }
 }
 
-/// Letters, digits and single underscores between them; a sign behind a word is a word.
+/// Letters, digits and single underscores between them; a sign after a word is a word.
 fn identifier(text: &str) -> String {
     let text = text.replace('+', " plus");
     let text = match text.strip_suffix('-') {

@@ -79,7 +79,7 @@ pub(super) fn at_port(frame: &LineFrame, drives: &[Axis]) -> LiveRow {
     arrow(frame, drives.len() + 1, ends)
 }
 
-/// A frame from one column to another, or to all; drives have the columns behind the first.
+/// A frame from one column to another, or to all; drives have the columns after the first.
 fn arrow(frame: &LineFrame, columns: usize, (from, to): (usize, Option<usize>)) -> LiveRow {
     let end = match frame.ended {
         FrameEnd::Good => String::new(),
@@ -97,7 +97,7 @@ fn arrow(frame: &LineFrame, columns: usize, (from, to): (usize, Option<usize>)) 
 }
 
 impl SharedDrives {
-    /// The column of a drive, counted behind that of all clients.
+    /// The column of a drive, counted after that of all clients.
     fn column(&self, node: u8) -> Option<usize> {
         let place = self.bench.nodes.iter().position(|other| *other == node)?;
         Some(place + 1)

@@ -38,7 +38,7 @@ pub(crate) fn serve(
 /// The bench of a header, and nodes 1 to `drives` on it. By default that is node 1, if the header has no drive.
 ///
 /// # Errors
-/// The header has mistakes. Steps behind it are ignored.
+/// The header has mistakes. Steps after it are ignored.
 pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<Unitek>, Problems> {
     let empty = Source {
         name: "setup".to_owned(),
@@ -77,7 +77,7 @@ impl SharedDrives {
         Self { bench, plan }
     }
 
-    /// The place of a client: behind the bench's host and the drives.
+    /// The place of a client: after the bench's host and the drives.
     fn guest(&self, client: usize) -> usize {
         1 + self.bench.nodes.len() + client
     }

@@ -61,7 +61,7 @@ fn run(server: &mut FrameServer<SharedDrives>, until: Instant) {
     server.advance(until);
 }
 
-/// A client that waits behind the answer to `rawmode` finds no frame in its segment, and gets what it was not sent in time, with right times.
+/// A client that waits after the answer to `rawmode` finds no frame in its segment, and gets what it was not sent in time, with right times.
 #[test]
 fn frames_are_held_back_behind_the_answer_to_rawmode() {
     let mut server = server(1);
@@ -101,7 +101,7 @@ fn frames_are_held_back_behind_the_answer_to_rawmode() {
     assert_eq!(took(&mut server, speaking).matches("frame").count(), 1);
 }
 
-/// The lower identifier wins, each client hears the other and not itself, and the drive answers behind both.
+/// The lower identifier wins, each client hears the other and not itself, and the drive answers after both.
 #[test]
 fn frames_of_clients_go_through_the_arbitration() {
     let mut server = server(1);

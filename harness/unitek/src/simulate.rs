@@ -106,7 +106,7 @@ impl Setup {
         }
     }
 
-    /// A segment with the bench's host, behind it the drives in their order, and behind them hosts for `guests`.
+    /// A segment with the bench's host, after it the drives in their order, and after them hosts for `guests`.
     #[must_use]
     pub(crate) fn segment(&self, guests: usize) -> Segment<Station> {
         let host = || Member::Host(Host::default());
@@ -446,7 +446,7 @@ mod tests {
         came.iter().map(|(_, text)| text.as_str()).collect()
     }
 
-    /// 77 bits of request without its intermission, and the reply of 82 bits behind it (ex 8).
+    /// 77 bits of request without its intermission, and the reply of 82 bits after it (ex 8).
     #[test]
     fn a_request_is_answered_at_once() {
         let mut bench = Bench::new(&Setup::of(1));

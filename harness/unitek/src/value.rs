@@ -80,7 +80,7 @@ impl Value {
     }
 }
 
-/// Reads `REGISTER=VALUE`: a number with a unit of the register, or hexadecimal digits, behind `0x` where the register has a unit.
+/// Reads `REGISTER=VALUE`: a number with a unit of the register, or hexadecimal digits, after `0x` where the register has a unit.
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
@@ -127,7 +127,7 @@ fn value(text: &str, register: &Register) -> Result<Value, String> {
         .ok_or_else(wrong)
 }
 
-/// A decimal number with at most nine digits behind its point.
+/// A decimal number with at most nine digits after its point.
 fn decimal(text: &str) -> Option<Decimal> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let places = u8::try_from(fraction.len()).ok()?;

@@ -28,7 +28,7 @@ const ADDRESSES: (u8, u8) = (2, 8);
 
 const RATE: BusRate = BusRate::K500;
 
-/// Bits behind a request within which a reply must begin (slot time).
+/// Bits after a request within which a reply must begin (slot time).
 const SLOT_BITS: u64 = 300;
 
 /// The time from one request to the next: long enough for all repetitions.
@@ -273,7 +273,7 @@ impl Desk {
         }
         let octets: Vec<u8> = heard.iter().map(|octet| octet.byte).collect();
         self.telegrams.push((true, octets.clone()));
-        // What comes behind a whole telegram is not read.
+        // What comes after a whole telegram is not read.
         match Telegram::decode(&octets) {
             Decoded::Value { value, used }
                 if heard[..used].iter().all(|octet| octet.error.is_none()) =>

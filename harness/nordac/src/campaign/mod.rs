@@ -165,7 +165,7 @@ impl DisturbedLine for Telegrams {
         parts.join("; ")
     }
 
-    /// Octets with the places of line errors behind them.
+    /// Octets with the places of line errors after them.
     fn written(octets: &Vec<Received>) -> String {
         let bad = octets
             .iter()

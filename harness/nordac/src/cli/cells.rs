@@ -21,7 +21,7 @@ pub(crate) fn names() -> impl Iterator<Item = String> {
     words.into_iter().chain(numbers)
 }
 
-/// Number, flags, name, section, limits and factory setting, and what behind its number selects a set or an element.
+/// Number, flags, name, section, limits and factory setting, and what after its number selects a set or an element.
 fn line(parameter: &Parameter) -> String {
     let limit = |limit: Limit| match limit {
         Limit::Raw(raw) => parameter.show(0, raw.into()).to_string(),

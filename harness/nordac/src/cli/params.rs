@@ -53,7 +53,7 @@ pub(super) const PARAMETERS: ParameterFile<Inverters, Assignment> = ParameterFil
     ),
 };
 
-/// Writes parameters. One whose limit is another of them, such as 1204 and 1205, is written behind it.
+/// Writes parameters. One whose limit is another of them, such as 1204 and 1205, is written after it.
 fn write_all(driver: &mut Driver<'_>, slave: u8, orders: &[Assignment]) -> Result<(), Error> {
     let mut left = orders.to_vec();
     loop {

@@ -210,7 +210,7 @@ impl Error {
     }
 }
 
-/// What is expected behind a word that stops.
+/// What is expected after a word that stops.
 pub(super) const OUTPUT_OFF: &str = "output off";
 
 fn stop(expected: &str) -> &'static str {

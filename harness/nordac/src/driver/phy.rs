@@ -23,7 +23,7 @@ pub(crate) struct Timing {
     pub(crate) rate: BusRate,
     /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it.
     pub(crate) patience: Span,
-    /// How much later a reply may still come. So long passes behind a request without a reply, or the next one would be given that reply.
+    /// How much later a reply may still come. So long passes after a request without a reply, or the next one would be given that reply.
     pub(crate) late: Span,
     /// How often the master looks at the line while nothing arrives; a line in virtual time needs no more than the default.
     pub(crate) step: Span,

@@ -217,7 +217,7 @@ fn services() {
     }
 }
 
-/// NORDAC 2.5.1: behind another PPO type or address the module forgets the frame count bit and the exchange.
+/// NORDAC 2.5.1: after another PPO type or address the module forgets the frame count bit and the exchange.
 #[test]
 fn restart() {
     let exchange = |fc: &str| format!("ask 08 02 {fc} 26 56 00 00 00 00 00 02 04 00 00 00\n");

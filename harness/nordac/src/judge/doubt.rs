@@ -15,7 +15,7 @@ pub(super) enum Sender {
     Known,
     /// It carries the address of a station that sends requests.
     Master,
-    /// It begins sooner behind a request than any slave replies (T_SDR, 11 bits).
+    /// It begins sooner after a request than any slave replies (T_SDR, 11 bits).
     NoPauseBefore,
     /// A request follows it sooner than any master begins one (T_SYN, 33 bits).
     NoPauseBehind,

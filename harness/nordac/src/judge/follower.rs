@@ -23,7 +23,7 @@ pub(super) enum Way {
         right: bool,
         watchdog: bool,
     },
-    /// And Chk_Cfg of the same master behind it.
+    /// And Chk_Cfg of the same master after it.
     Configured {
         master: u8,
         ppo: Option<PpoType>,
@@ -48,7 +48,7 @@ pub(super) struct Follower {
     pub(super) way: Way,
     pub(super) record: Record,
     pub(super) tasks: Tasks,
-    /// The number of a task behind which the module may restart, until it is answered.
+    /// The number of a task after which the module may restart, until it is answered.
     restarts: Option<u16>,
     /// The configuration that the slave has shown since it was last set up.
     shown: Option<PpoType>,
@@ -440,7 +440,7 @@ impl Follower {
     }
 }
 
-/// The number of a task behind which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
+/// The number of a task after which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
 fn may_restart(request: &Pdu) -> Option<u16> {
     let exchanges = Service::of(request.dsap()) == Some(Service::DataExchange);
     let task = outputs(request.data()).filter(|_| exchanges)?.pkw;

@@ -469,7 +469,7 @@ impl Judge {
         }
     }
 
-    /// A slave replies at `at`: in a capture, a long silence behind its last reply may have been one without supply.
+    /// A slave replies at `at`: in a capture, a long silence after its last reply may have been one without supply.
     fn comes(&mut self, address: u8, at: Instant) {
         let recorded = self.recorded;
         let follower = self.follower(address);

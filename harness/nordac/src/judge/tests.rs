@@ -37,7 +37,7 @@ pub(super) fn scenarios() -> Vec<Source> {
 
 /// The telegrams of a scenario with these lines in its header.
 pub(super) fn trace(source: &Source, lines: &str) -> Trace {
-    // Lines about slaves stand behind those that make them.
+    // Lines about slaves stand after those that make them.
     let begin = source.text.find("\nslave ").map(|at| at + 1);
     let end = begin.map(|at| {
         let rest = &source.text[at..];
@@ -56,7 +56,7 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
     link.trace(0)
 }
 
-/// The same telegrams behind a token that the master passes to itself, as a master alone on a line does: without it, the first octets of a
+/// The same telegrams after a token that the master passes to itself, as a master alone on a line does: without it, the first octets of a
 /// capture may be the end of a telegram.
 fn behind_a_token(mut trace: Trace) -> Trace {
     let octets = octets(&trace);

@@ -19,11 +19,11 @@ use std::collections::BTreeMap;
 
 /// How long a drive may need for a state that it reaches at once.
 const PATIENCE: Span = Span::from_millis(1000);
-/// How long it may need for one behind a ramp.
+/// How long it may need for one after a ramp.
 const RAMP: Span = Span::from_millis(600_000);
 /// The time between two exchanges while a job waits for a state.
 const POLL: Span = Span::from_millis(10);
-/// The exchange whose reply shows a task's answer: two behind the one that carries the task (3.4.1). A slower drive may need more.
+/// The exchange whose reply shows a task's answer: two after the one that carries the task (3.4.1). A slower drive may need more.
 const MOST_EXCHANGES: usize = 32;
 
 /// PZD valid, OFF2 and OFF3 not active, enable, setpoint enabled, and OFF1: the drive gets ready (3.2.1).

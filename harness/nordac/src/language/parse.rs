@@ -108,7 +108,7 @@ fn slave_line(
     Some(Ok(()))
 }
 
-/// Reads what stands behind the opening of a step; `None` if there is no such word.
+/// Reads what stands after the opening of a step; `None` if there is no such word.
 pub(super) fn step(
     opening: Opening<'_>,
     scanner: &mut Scanner<'_>,

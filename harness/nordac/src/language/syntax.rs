@@ -49,7 +49,7 @@ pub(crate) enum SetupKind {
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterName {
     pub(crate) which: Which,
-    /// What stands behind it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
+    /// What stands after it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
     pub(crate) index: Vec<Located>,
     pub(crate) span: TextSpan,
 }
@@ -82,7 +82,7 @@ pub(crate) enum ValueKind {
     Counted(Located),
 }
 
-/// A telegram behind `>` or `<`.
+/// A telegram after `>` or `<`.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub(crate) octets: Pattern,
@@ -144,7 +144,7 @@ pub(crate) enum Sender {
 pub(crate) enum OctetHarm {
     /// One that says all that there is to say.
     Plain(LinkFault),
-    /// `delay 3ms`: it leaves later, and those behind it too.
+    /// `delay 3ms`: it leaves later, and those after it too.
     Delay(Duration),
 }
 
@@ -196,7 +196,7 @@ pub(crate) enum JobKind {
     },
     /// `read 8 1202 = 5s`.
     Read(ParameterName, Option<WantedAnswer>),
-    /// `write 8 1205.3 = 50.0Hz`, with `error 2` behind it where it must be refused.
+    /// `write 8 1205.3 = 50.0Hz`, with `error 2` after it where it must be refused.
     Write(ParameterName, WrittenValue, Option<Located>),
     /// `on 8`.
     On,
@@ -241,7 +241,7 @@ pub(crate) struct WordValue {
 pub(crate) enum WordKind {
     /// `047F`, `0Fxx`: hexadecimal digits, `xx` for any byte.
     Bytes(Vec<Option<u8>>),
-    /// `50%` of 4000h, as its digits and how many of them stand behind the point.
+    /// `50%` of 4000h, as its digits and how many of them stand after the point.
     Percent(i64, u32),
     /// `(k*256)`.
     Counted(Located),

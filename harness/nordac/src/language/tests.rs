@@ -20,7 +20,7 @@ fn source(text: &str) -> Source {
     }
 }
 
-/// The verdict of these lines behind the common header, and what was wrong.
+/// The verdict of these lines after the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
     let found = settle::<Nordac>(&source(&format!("{HEADER}{lines}")), BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));

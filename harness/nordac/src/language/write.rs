@@ -87,7 +87,7 @@ fn value(value: &WrittenValue) -> String {
     }
 }
 
-/// A telegram as it stands behind `>` or `<`.
+/// A telegram as it stands after `>` or `<`.
 pub(super) fn message(message: &Message) -> String {
     let mut text = message.octets.to_string();
     for Bad { octet, how } in &message.bad {
@@ -147,7 +147,7 @@ pub(super) fn step(step: &TelegramStep) -> String {
     }
 }
 
-/// Whose octets or telegrams are counted, with a blank behind it.
+/// Whose octets or telegrams are counted, with a blank after it.
 fn sender(sender: &Sender) -> String {
     match sender {
         Sender::Any => String::new(),

@@ -1,4 +1,4 @@
-//! What slaves held before a fuzz run, and what its conversations may have written: put back behind each of them.
+//! What slaves held before a fuzz run, and what its conversations may have written: put back after each of them.
 
 use super::known::{Known, PPO_TYPE};
 use super::observed::{changes, moves_to};
@@ -43,7 +43,7 @@ impl HeldBefore {
         !self.0.written.is_empty()
     }
 
-    /// Notes telegrams that are about to be sent. Returns why they are not sent: behind them a slave may have no parameter channel, by which
+    /// Notes telegrams that are about to be sent. Returns why they are not sent: after them a slave may have no parameter channel, by which
     /// alone it can be put back, or the address of another station. Every such address is asked for its status.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl HeldBefore {
     }
 }
 
-/// Whether a slave has a parameter channel behind a task that changes its PPO type, which is numbered from 0 there (NORDAC 5.5).
+/// Whether a slave has a parameter channel after a task that changes its PPO type, which is numbered from 0 there (NORDAC 5.5).
 fn has_channel(task: Pkw) -> bool {
     let number = u8::try_from(task.low_word().saturating_add(1)).ok();
     let ppo = number.and_then(PpoType::from_number);
@@ -114,7 +114,7 @@ mod tests {
         }
     }
 
-    /// Another address (1624), and the factory setting, behind which it is 126 (NORDAC 4.1.3, 5.5).
+    /// Another address (1624), and the factory setting, after which it is 126 (NORDAC 4.1.3, 5.5).
     #[test]
     fn addresses_are_read_out_of_tasks() {
         let moved = |number, value| moves_to(Pkw::of(2, number, 0, value));

@@ -185,7 +185,7 @@ pub(super) fn answer(
     Ok(None)
 }
 
-/// The same, as the exchange behind it shows it too: a value is put back later, and a wrong slave may show the one of an earlier answer first.
+/// The same, as the exchange after it shows it too: a value is put back later, and a wrong slave may show the one of an earlier answer first.
 fn confirmed(slave: RigSlave, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<Pkw>, TalkError> {
     let Some(mut last) = answer(slave, talk, task)? else {
         return Ok(None);

@@ -20,7 +20,7 @@ pub(super) type Observed<'l> = harness_bench::rig::playing::observed::Observed<'
 /// A parameter that may have been written: station, number and IND.
 pub(super) type WrittenParameter = (u8, u16, u16);
 
-/// A telegram of the bench, and what came behind it.
+/// A telegram of the bench, and what came after it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Turn {
     /// The step of the scenario that has sent it; `None` for what made the slaves ready.
@@ -161,7 +161,7 @@ impl TelegramNotes {
         self.took[1] = self.took[1].max(now.since_start());
     }
 
-    /// The link ends with the first octet behind the first `behind` ones that is not that of `came`: how far they agree is known then.
+    /// The link ends with the first octet after the first `behind` ones that is not that of `came`: how far they agree is known then.
     pub(super) fn expect(&mut self, came: &ReceivedOctets, behind: usize, timed: bool) {
         self.expected = Some(ExpectedOctets {
             came: came.clone(),

@@ -37,7 +37,7 @@ const TRIES: usize = 3;
 /// A parameter: its number and IND.
 type Place = (u16, u16);
 
-/// The order in which parameters are put back: those behind which the slave is reached in another way are last.
+/// The order in which parameters are put back: those after which the slave is reached in another way are last.
 const fn rank(number: u16) -> u8 {
     match number {
         INTERFACE => 1,
@@ -212,7 +212,7 @@ impl<'k, 'l> Restoration<'k, 'l> {
         Ok(answer(self.slave, &mut self.talk, task)?.and_then(value))
     }
 
-    /// Puts parameters back, one after another. Returns the first that is not as it was with those behind it, and why.
+    /// Puts parameters back, one after another. Returns the first that is not as it was with those after it, and why.
     fn all(&mut self, places: &[Place]) -> Option<(Vec<Place>, String)> {
         if places.is_empty() {
             return None;

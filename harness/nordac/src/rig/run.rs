@@ -1,4 +1,4 @@
-//! NORDAC inverters on which scenarios are played: what their player offers, and what is set back behind a scenario.
+//! NORDAC inverters on which scenarios are played: what their player offers, and what is set back after a scenario.
 
 use super::player::{Own, Player};
 use super::profile::ProfileSettings;

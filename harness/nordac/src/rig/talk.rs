@@ -167,7 +167,7 @@ impl<'l> Talk<'l> {
                 Some(reply) if !fits(&pdu, &reply) => other = Some(reply),
                 reply => return Ok(reply),
             }
-            // A busy computer hands over a reply late, and then to a request that came behind: what is under way passes first.
+            // A busy computer hands over a reply late, and then to a later request: what is under way passes first.
             self.pass(self.patience)?;
         }
         Ok(other)

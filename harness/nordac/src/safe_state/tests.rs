@@ -156,7 +156,7 @@ fn other_ways_in() {
     }
 }
 
-/// The reply to a request of before comes behind the first request of the safe state. It is no reply to that.
+/// The reply to a request of before comes after the first request of the safe state. It is no reply to that.
 #[test]
 fn a_late_reply_is_not_taken_for_another() {
     let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::unlimited());

@@ -28,7 +28,7 @@ const SHOWN: [(&str, u8); 11] = [
     ("bus voltage", 0xEB),
 ];
 
-/// The registers of `top`, in the order of its columns behind the drive's number.
+/// The registers of `top`, in the order of its columns after the drive's number.
 const OF_TOP: [u8; 7] = [0xE2, 0xE8, 0x51, 0x30, 0x6D, 0x40, 0x8F];
 
 /// The table of `top`.

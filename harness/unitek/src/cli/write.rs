@@ -51,7 +51,7 @@ pub(super) fn write(
     })
 }
 
-/// Refuses writes of which one is denied, before the first is sent. A write that an earlier one permits, such as a speed of 0 behind a
+/// Refuses writes of which one is denied, before the first is sent. A write that an earlier one permits, such as a speed of 0 after a
 /// lock, is judged when it is due.
 pub(super) fn refuse_denied(driver: &mut Driver<'_>, orders: &[Order]) -> Result<(), Failure> {
     let job = |(axis, register, data): &Order| {

@@ -26,7 +26,7 @@ const START_UP: Span = Span::from_millis(2_000);
 /// How long a drive behind an adapter may be silent before one has not answered: the computer or the adapter may stand still for that long.
 const SILENCE: Span = Span::from_millis(2_500);
 
-/// What a drive is asked for while it is silent, and how long the line is left alone behind each request.
+/// What a drive is asked for while it is silent, and how long the line is left alone after each request.
 const ALIVE: (u8, Span) = (0x40, Span::from_millis(50));
 
 /// How long replies are waited for that belong to requests from the time of a silence.
@@ -250,7 +250,7 @@ impl<'l> Driver<'l> {
         frame.is_some_and(|frame| self.line.permits(0, Out::Frames(&[frame])))
     }
 
-    /// Why the first of some jobs that the line denies is denied; `None` if the line lets all of them pass, one behind the other. Nothing is
+    /// Why the first of some jobs that the line denies is denied; `None` if the line lets all of them pass, one after the other. Nothing is
     /// sent.
     #[must_use]
     pub(crate) fn denied(&self, jobs: &[(Axis, Job)]) -> Option<String> {

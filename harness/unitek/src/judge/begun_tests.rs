@@ -87,7 +87,7 @@ fn events() {
     right(&[&READ[..], &events].concat());
     let read = [(200, "201#3D5100"), (204, "181#51100000")];
     right(&[&READ[..], &events, &read].concat());
-    // A cycle would have shown itself behind the write.
+    // A cycle would have shown itself after the write.
     let off = (10_000, "201#510400");
     let late = (15_500, "181#400101000000");
     let asks = [
@@ -248,7 +248,7 @@ fn second_identifiers() {
     }
 }
 
-/// UNITEK ex 9: a cycle that goes on behind a gap of an hour, and one that does not.
+/// UNITEK ex 9: a cycle that goes on after a gap of an hour, and one that does not.
 #[test]
 fn a_gap_in_a_cycle() {
     const HOUR: u64 = 36_000_000;
@@ -270,7 +270,7 @@ fn a_gap_in_a_cycle() {
         assert_eq!(found, (0, usize::from(!gone_on)), "{judged:#?}");
         assert!(judged.remarks.iter().any(gap), "{judged:#?}");
     }
-    // It was stopped behind the gap, before a frame was due.
+    // It was stopped after the gap, before a frame was due.
     let stop = [(HOUR + 15_000, "201#3D30FF")];
     assert_eq!(counts(&[&before[..], &stop].concat()), (0, 1));
     // The host goes on, however slowly.
@@ -339,7 +339,7 @@ fn a_clock_that_was_set() {
     assert_eq!((found.len(), found[0].what), (1, FrameSymptom::Value));
     // Behind another recording's begin it is not known what was written between.
     assert_eq!(judged(&frames, 3, SeamKind::Recording).breaches, []);
-    // A cycle of 100 ms goes on 20 ms behind its last frame.
+    // A cycle of 100 ms goes on 20 ms after its last frame.
     let asks = [(0, "201#3D3064")];
     let mut frames = [&asks[..], &cycle("181#30010200", 1_000, 5)[1..]].concat();
     frames.extend([(4_200, "181#30010200"), (5_200, "181#30010200")]);
@@ -384,7 +384,7 @@ fn other_devices() {
     assert_eq!(judged.remarks, [line]);
 }
 
-/// A log that ends behind a request says nothing of its reply.
+/// A log that ends after a request says nothing of its reply.
 #[test]
 fn a_log_ends_before_the_reply() {
     let remarks = |frames: &[(u64, &str)]| judged(frames).remarks.len();

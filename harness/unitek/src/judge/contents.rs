@@ -14,7 +14,7 @@ impl Follower {
         let register = Register::of(reply.register);
         let long = matches!(reply.data, Data::Long(_));
         let map = matches!(reply.register, 0x40 | 0x8F);
-        // What was read before DC was written may come behind it.
+        // What was read before DC was written may come after it.
         let settled = at.since(self.wide_at) > self.slowest.unwrap_or_default() + self.patience;
         let wide = self
             .wide

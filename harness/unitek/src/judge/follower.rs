@@ -68,9 +68,9 @@ pub(crate) struct Follower {
     pub(super) held: Vec<Contents>,
     pub(super) cycles: [Cycle; 256],
     pub(super) asked: VecDeque<PendingRequest>,
-    /// Contents that a reply under way may have, by register: a frame of a cycle or an event came behind its request, and may not have been it.
+    /// Contents that a reply under way may have, by register: a frame of a cycle or an event came after its request, and may not have been it.
     pub(super) loose: BTreeMap<u8, (Instant, Contents)>,
-    /// The latest of all replies, behind its request.
+    /// The latest of all replies, after its request.
     pub(super) slowest: Option<Span>,
     /// Whether replies with 8F are short, once it is known (`map-reply`).
     pub(super) short_map: Option<bool>,
@@ -86,7 +86,7 @@ pub(crate) struct Follower {
     /// What hosts have sent on other identifiers.
     pub(super) elsewhere: Elsewhere,
     pub(super) begin: Option<Instant>,
-    /// When the first frame behind the last gap of the log began.
+    /// When the first frame after the last gap of the log began.
     pub(super) gap: Option<Instant>,
     /// Registers of which a frame came that nothing here asks for, and when last: their cycles run since before the first frame.
     pub(super) unsolicited: BTreeMap<u8, Instant>,

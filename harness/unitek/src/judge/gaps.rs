@@ -1,4 +1,4 @@
-//! Gaps of a log: what was due in one accuses no drive, and what never comes behind them does.
+//! Gaps of a log: what was due in one accuses no drive, and what never comes after them does.
 
 use super::cycle::Cycle;
 use super::follower::{Follower, Homing, PendingRequest};
@@ -6,7 +6,7 @@ use super::symptom::FrameSymptom::Missing;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Register;
 
-/// So often may something be missing behind a gap of the log.
+/// So often may something be missing after a gap of the log.
 const MOST: usize = 3;
 
 /// Why it accuses no drive.
@@ -47,7 +47,7 @@ impl Follower {
             .has_gap(other, self.judged.breaches.len(), number, at);
     }
 
-    /// The place of the request that a reply answers: one behind the last gap of the log, where there is one.
+    /// The place of the request that a reply answers: one after the last gap of the log, where there is one.
     pub(super) fn answered(&self, register: u8) -> Option<usize> {
         let place = |excused: bool| {
             let mut asked = self.asked.iter();
@@ -90,7 +90,7 @@ impl Follower {
         }
     }
 
-    /// The log ends: what waits behind a gap did not come.
+    /// The log ends: what waits after a gap did not come.
     pub(super) fn owes_at_the_end(&mut self, number: usize) {
         (0..=u8::MAX).for_each(|register| self.owes(number, register));
         for asked in std::mem::take(&mut self.asked) {

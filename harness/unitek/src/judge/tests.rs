@@ -169,7 +169,7 @@ fn right_drives(share: usize) {
             if !line.is_empty() && !(place + number).is_multiple_of(share) {
                 continue;
             }
-            // A scenario's own lines come behind and win.
+            // A scenario's own lines come after and win.
             let header = if line.is_empty() {
                 String::new()
             } else {

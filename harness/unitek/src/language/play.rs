@@ -143,7 +143,7 @@ pub(crate) fn written(frame: &Frame) -> String {
     })
 }
 
-/// A value with its unit behind the raw number.
+/// A value with its unit after the raw number.
 fn value(register: u8, raw: u32) -> String {
     let register = Register::of(register);
     let digits = register.width.bits() as usize / 4;

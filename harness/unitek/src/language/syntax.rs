@@ -108,7 +108,7 @@ pub(crate) struct Expect {
     pub(crate) tolerance: Option<WrittenValue>,
 }
 
-/// A frame behind `>` or `<`.
+/// A frame after `>` or `<`.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub(crate) id: Id,

@@ -20,7 +20,7 @@ fn source(text: &str) -> Source {
     }
 }
 
-/// The verdict of these lines behind the common header, and what was wrong.
+/// The verdict of these lines after the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
     let found = settle::<Unitek>(&source(&format!("{HEADER}{lines}")), BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
@@ -112,7 +112,7 @@ master start-up 1
     assert_eq!(write(&scenario), text);
 }
 
-/// The other spelling of frames, with a comment behind it.
+/// The other spelling of frames, with a comment after it.
 #[test]
 fn frames_as_candump_writes_them() {
     let lines = "drive 1\n\n> 201#520C00 # mask\n< 181#4085310000xx\n> 201#R3\n> 201#\n> 00000201#3D4000#\n";

@@ -97,7 +97,7 @@ fn expect(expect: &Expect) -> String {
     }
 }
 
-/// A frame as it stands behind `>` or `<`.
+/// A frame as it stands after `>` or `<`.
 pub(super) fn message(message: &Message) -> String {
     let id = identifier(message.id);
     match &message.content {

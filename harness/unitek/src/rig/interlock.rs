@@ -111,7 +111,7 @@ struct RegisterInterlock {
     every: Span,
     /// On a clock that is never set back.
     next: Instant,
-    /// Read from the drive when it is needed, and again behind what may have changed it.
+    /// Read from the drive when it is needed, and again after what may have changed it.
     scaling: Option<Scaling>,
     /// The drive sends the register by itself, as the conversation has asked it to.
     sends_itself: bool,

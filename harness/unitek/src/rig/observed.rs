@@ -90,21 +90,21 @@ impl Exchange {
         self.came.iter().skip(self.came_before).map(|came| &came.2)
     }
 
-    /// Whether something came behind the last frame that was sent.
+    /// Whether something came after the last frame that was sent.
     pub(super) fn answers_last(&self) -> bool {
         let sent = self.sent.last().map(|sent| sent.0);
         let came = self.came.last().map(|came| came.1);
         came >= sent
     }
 
-    /// How long behind its stamp the last frame was read: the others of an adapter that stood still are still to come.
+    /// How long after its stamp the last frame was read: the others of an adapter that stood still are still to come.
     pub(super) fn last_late(&self) -> Span {
         let last = self.came.last();
         last.map_or(Span::ZERO, |(at, read, _)| read.since(*at))
     }
 
     /// The longest time for which something stood still: nothing came of a register that comes by itself, more often before or afterwards, or
-    /// a frame was read behind its stamp.
+    /// a frame was read after its stamp.
     pub(super) fn longest_standstill(&self) -> Span {
         let mut streams: BTreeMap<_, Vec<Instant>> = BTreeMap::new();
         for (at, _, frame) in &self.came {
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(late.longest_standstill(), Span::from_millis(390));
     }
 
-    /// Requests that were repeated meanwhile are all answered behind a pause; a drive that has lost a reply does not send it later.
+    /// Requests that were repeated meanwhile are all answered after a pause; a drive that has lost a reply does not send it later.
     #[test]
     fn a_pause_in_which_requests_are_repeated_is_one() {
         let pause = longest(&[5, 300, 300, 301], &[4, 20, 40, 60]);

@@ -125,7 +125,7 @@ pub(super) fn settle_within(
 }
 
 /// The value of `interval-accuracy` that the frames of a cycle show, where time is exact. One frame that is a scan late makes the interval
-/// behind it shorter; a drive that is late at each frame keeps no value, and is judged as an exact one.
+/// after it shorter; a drive that is late at each frame keeps no value, and is judged as an exact one.
 fn accuracy(frames: &[Instant]) -> Option<&'static str> {
     let quarter = Span::from_micros(250);
     let is = |gap: Span, expected: Span| gap < expected + quarter && gap + quarter > expected;
@@ -470,7 +470,7 @@ impl Probe<'_, '_> {
         Ok(())
     }
 
-    /// What clears a time-out of the bus, and whether the drive is enabled again behind it.
+    /// What clears a time-out of the bus, and whether the drive is enabled again after it.
     ///
     /// # Errors
     /// Nothing clears it: no value of an open point explains that.

@@ -1,4 +1,4 @@
-//! What a scenario or a probe has left of its own in drives: set back behind it, and read. What cannot be set back is said, with the command
+//! What a scenario or a probe has left of its own in drives: set back after it, and read. What cannot be set back is said, with the command
 //! that does it.
 
 use super::known::Known;
@@ -119,7 +119,7 @@ pub(super) fn set_back(
     stored: &BTreeSet<(u16, u16)>,
 ) -> Vec<String> {
     let rig = session.rig().clone();
-    // No motor is released behind an interlock that has tripped.
+    // No motor is released once an interlock has tripped.
     let may_release = rig.file.interlock.is_empty();
     let mut notes = Vec::new();
     for known in drives {

@@ -42,7 +42,7 @@ const WORDS: [(&str, Word); 8] = [
     ("restart", Word::Restart),
 ];
 
-/// Reads what stands behind `slave`.
+/// Reads what stands after `slave`.
 pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Problem> {
     let slave = expression::sum(scanner)?;
     let before = scanner.clone();

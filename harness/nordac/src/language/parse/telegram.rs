@@ -11,7 +11,7 @@ use harness_sim::fault::Flips;
 /// The word in front of a damaged octet.
 const BAD: &str = "bad";
 
-/// Reads what stands behind `>` or `<`.
+/// Reads what stands after `>` or `<`.
 pub(in super::super) fn message(scanner: &mut Scanner<'_>) -> Result<Message, Problem> {
     let mut ahead = scanner.before(&[" bad "]);
     let octets = pattern::pattern(&mut ahead)?;
@@ -26,7 +26,7 @@ pub(in super::super) fn message(scanner: &mut Scanner<'_>) -> Result<Message, Pr
     Ok(Message { octets, bad })
 }
 
-/// What stands behind the number of a damaged octet.
+/// What stands after the number of a damaged octet.
 fn damage(scanner: &mut Scanner<'_>) -> Result<Damage, Problem> {
     let mut ahead = scanner.clone();
     if ahead.at_end() || ahead.eat_word(BAD) {

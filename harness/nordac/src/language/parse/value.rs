@@ -129,7 +129,7 @@ fn kind(scanner: &mut Scanner<'_>) -> Result<ValueKind, Problem> {
     }
 }
 
-/// A decimal number without sign: its digits, and how many of them stand behind the point.
+/// A decimal number without sign: its digits, and how many of them stand after the point.
 pub(super) fn decimal(text: &str) -> Option<(i64, u32)> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let all = whole.len() + fraction.len();

@@ -153,7 +153,7 @@ impl PlannedParameter {
         known.unwrap_or(self.index.element << 8)
     }
 
-    /// A raw number in messages, with its unit behind it.
+    /// A raw number in messages, with its unit after it.
     #[must_use]
     pub(crate) fn shown(&self, raw: u32) -> String {
         let Some(known) = self.known else {

@@ -19,7 +19,7 @@ use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// In how many attempts at a scenario, one behind the other, the line may have lost the same telegram or its reply.
+/// In how many attempts at a scenario, one after the other, the line may have lost the same telegram or its reply.
 const LOST_BY_THE_LINE: usize = 2;
 
 impl Player {

@@ -89,7 +89,7 @@ struct AttemptEvidence {
     switches: bool,
     /// Whether the slaves sent anything.
     heard: bool,
-    /// The telegrams of the bench, with what came behind each.
+    /// The telegrams of the bench, with what came after each.
     turns: Vec<Turn>,
 }
 
@@ -123,7 +123,7 @@ pub(crate) struct Player {
     /// Why nothing can be played on simulated slaves.
     unable: Option<String>,
     qualifies: bool,
-    /// In how many attempts, one behind the other, something was lost behind a telegram: by scenario, and by step and place among its telegrams.
+    /// In how many attempts, one after the other, something was lost after a telegram: by scenario, and by step and place among its telegrams.
     lost: BTreeMap<String, BTreeMap<(Option<usize>, usize), usize>>,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,

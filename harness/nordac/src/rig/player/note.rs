@@ -44,7 +44,7 @@ pub(crate) struct SlaveNote {
     /// Whether the settings of the bus were switched to those of the scenario.
     switches: bool,
     shown: AttemptShown,
-    /// Where time is real, the telegrams of the bench with what came behind each.
+    /// Where time is real, the telegrams of the bench with what came after each.
     turns: Vec<Turn>,
     noted: Noted,
 }
@@ -57,7 +57,7 @@ struct AttemptShown {
     ended: Option<(Verdict, Option<usize>)>,
     /// The octets that came; none where time is real.
     came: ReceivedOctets,
-    /// Where time is real, the telegrams: by addresses and service the contents, one behind the other where they change.
+    /// Where time is real, the telegrams: by addresses and service the contents, one after the other where they change.
     telegrams: BTreeMap<String, Vec<String>>,
 }
 

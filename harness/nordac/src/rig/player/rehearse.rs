@@ -70,7 +70,7 @@ pub(super) struct Rehearsal {
     written: BTreeSet<WrittenParameter>,
     /// What came from the first telegram on that makes the slaves ready.
     pub(super) came: ReceivedOctets,
-    /// The telegrams of the bench, with what came behind each.
+    /// The telegrams of the bench, with what came after each.
     pub(super) turns: Vec<Turn>,
 }
 
@@ -196,7 +196,7 @@ impl Player {
         })
     }
 
-    /// Why slaves could not be put back behind a scenario that was played on their model.
+    /// Why slaves could not be put back after a scenario that was played on their model.
     fn loses(&self, bench: &Bench, moved: &BTreeSet<(u8, u8)>) -> Option<String> {
         let taken = |to: u8| to == MASTER || self.slaves.iter().any(|slave| slave.address == to);
         let moved = moved.iter().find(|(slave, to)| slave != to && taken(*to));
@@ -349,7 +349,7 @@ pub(super) const fn may_switch_settings(limits: &Limits) -> bool {
     limits.motion && limits.eeprom && limits.bus_settings
 }
 
-/// A scenario behind which an inverter has a fault is not begun where the bench may not acknowledge it: it would stay for the scenarios behind.
+/// A scenario after which an inverter has a fault is not begun where the bench may not acknowledge it: it would stay for later scenarios.
 fn left_in_fault(slave: u8) -> Why {
     Why::Denied(format!(
         "it leaves slave {slave} with a fault, and to acknowledge one needs `allow_motion` in the rig's [limits] and --allow-motion"

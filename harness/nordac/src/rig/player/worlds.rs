@@ -1,6 +1,6 @@
 //! Whether slaves could have sent what came behind an adapter.
 //!
-//! When a telegram has reached them is not known exactly: not before it had left the bench, and not behind the time at which its reply was read.
+//! When a telegram has reached them is not known exactly: not before it had left the bench, and not after the time at which its reply was read.
 //! Slaves could have sent what came if for every telegram there is such a time with which they send these very octets. So nothing is excused
 //! because it is late, and where a motor moves the reply says itself when it was asked.
 
@@ -51,7 +51,7 @@ pub(super) struct Divergence {
 }
 
 /// Whether right slaves of which this is `known`, with some values of the points that are not settled of them, could have sent what came over a
-/// line that has lost this many telegrams or replies at most; returns behind which telegrams.
+/// line that has lost this many telegrams or replies at most; returns after which telegrams.
 ///
 /// # Errors
 /// Where the slaves as they are known differ.
@@ -175,7 +175,7 @@ impl Talk {
         all
     }
 
-    /// Whether slaves that were just switched on could have sent what came; behind which telegrams something was lost.
+    /// Whether slaves that were just switched on could have sent what came; after which telegrams something was lost.
     fn sent_by(&self, slaves: &[SlaveSetup], alive: &dyn Fn()) -> Result<Vec<usize>, Divergence> {
         let line = Line::<LONG>::new(slaves);
         let came = &self.talk.came;
@@ -220,7 +220,7 @@ impl Talk {
     }
 }
 
-/// By when a telegram has reached the slaves: before its reply was read, which may be read behind the next telegram, or else before that one left.
+/// By when a telegram has reached the slaves: before its reply was read, which may be read after the next telegram, or else before that one left.
 fn read_by(turns: &[Turn], number: usize) -> Instant {
     let turn = &turns[number];
     let asks = || {
@@ -238,7 +238,7 @@ fn read_by(turns: &[Turn], number: usize) -> Instant {
     read.or(next).unwrap_or_default().max(turn.left)
 }
 
-/// What came in the scenario, piece by piece, and behind which telegram each has begun. What a `lossy` line has left of replies is one piece.
+/// What came in the scenario, piece by piece, and after which telegram each has begun. What a `lossy` line has left of replies is one piece.
 fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
     let mut octets = Vec::new();
     let mut ends = Vec::new();

@@ -1,4 +1,4 @@
-//! Scenarios one behind another on slaves that are not switched off between them, as behind a port: no right slave is accused for what an earlier
+//! Scenarios one after another on slaves that are not switched off between them, as behind a port: no right slave is accused for what an earlier
 //! one has left, and all is put back.
 
 use super::super::RigSlave;
@@ -153,7 +153,7 @@ fn a_slave_that_leaves_meanwhile_is_put_back() {
 }
 
 /// NORDAC 2.5.1, 3.2.1: an inverter that its terminals control goes on holding the word that came last while the bus controlled it. It is not
-/// accused for that, and shows neither OFF2 nor OFF3 to the scenarios behind.
+/// accused for that, and shows neither OFF2 nor OFF3 to the scenarios after it.
 #[test]
 fn a_word_of_an_earlier_scenario_accuses_no_slave() {
     let mut desk = Desk::new(0, &[], Limits::unlimited());
@@ -349,7 +349,7 @@ fn a_time_out_that_comes_meanwhile_accuses_no_slave() {
     }
 }
 
-/// All scenarios of this bus, one behind another on inverters that are not switched off.
+/// All scenarios of this bus, one after another on inverters that are not switched off.
 #[test]
 #[ignore = "takes some minutes; .ci/nightly runs it"]
 fn all_scenarios_accuse_no_slave_and_leave_nothing() {

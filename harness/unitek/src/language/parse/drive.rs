@@ -61,7 +61,7 @@ pub(in super::super) fn mode_word(mode: Control) -> &'static str {
     row.map_or("", |(word, _)| word)
 }
 
-/// Reads what stands behind `drive`.
+/// Reads what stands after `drive`.
 pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, DriveLine), Problem> {
     let drive = expression::sum(scanner)?;
     if scanner.at_end() {

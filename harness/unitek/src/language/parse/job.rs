@@ -1,4 +1,4 @@
-//! Jobs of the master: `read 1 SPEED_ACTUAL = 50%`, and those of the driver behind `master`.
+//! Jobs of the master: `read 1 SPEED_ACTUAL = 50%`, and those of the driver after `master`.
 
 use super::super::syntax::{JobKind, JobStep};
 use super::value;
@@ -20,7 +20,7 @@ pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<JobSte
     NAMES.contains(&name).then(|| one(name, scanner))
 }
 
-/// Reads what stands behind `master`.
+/// Reads what stands after `master`.
 pub(super) fn by_driver(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let names = DRIVER.map(|name| (name, name));
     let name = named(scanner, &names, "what the driver is to do")?;

@@ -1,4 +1,4 @@
-//! Frames behind `>` and `<`: `201 52 0C 00`, `201#520C00`, `201 rtr 3`, `x00000201 3D 40 00`.
+//! Frames after `>` and `<`: `201 52 0C 00`, `201#520C00`, `201 rtr 3`, `x00000201 3D 40 00`.
 
 use super::super::syntax::{Content, Message};
 use harness_bench::scenario::pattern::{self, Expected, Pattern};
@@ -74,7 +74,7 @@ pub(super) fn identifier(scanner: &mut Scanner<'_>) -> Result<Id, Problem> {
     })
 }
 
-/// What stands behind `#`: `520C00`, `4085310000xx`, `R3`, or nothing.
+/// What stands after `#`: `520C00`, `4085310000xx`, `R3`, or nothing.
 fn candump(scanner: &mut Scanner<'_>) -> Result<Content, Problem> {
     let here = scanner.here();
     if scanner.tight().is_empty() || scanner.tight().starts_with([' ', '\t']) {

@@ -201,7 +201,7 @@ fn kind(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<ValueKind, Prob
     Err(unexpected(help))
 }
 
-/// The scanner behind a number that it had in front of it.
+/// The scanner after a number that it had in front of it.
 fn scanner_behind<'t>(before: &Scanner<'t>, signed: bool, text: &str) -> Scanner<'t> {
     let mut behind = before.clone();
     if signed && !behind.eat("-") {

@@ -1,8 +1,8 @@
 //! Many cycles at once, counted: with each more there are more worlds than are kept, and how many frames of a register come does not depend
 //! on when its cycle began.
 //!
-//! A cycle runs at least from the reply to a request behind its own until the request that stops it is sent, and at most from when its
-//! own was sent until the reply to one behind the stop was read.
+//! A cycle runs at least from the reply to a request after its own until the request that stops it is sent, and at most from when its
+//! own was sent until the reply to one after the stop was read.
 
 use super::super::Axis;
 use super::super::observed::Exchange;
@@ -102,7 +102,7 @@ impl<'t> Conversation<'t> {
         self.sent.iter().filter(reads).count()
     }
 
-    /// When the reply was read to the first request behind a place whose register is asked for once.
+    /// When the reply was read to the first request after a place whose register is asked for once.
     fn confirmed(&self, place: usize) -> Option<Instant> {
         let mut behind = self.sent.iter().skip(place + 1);
         behind.find_map(|(_, request)| {
@@ -191,7 +191,7 @@ mod tests {
         text.parse().expect("a frame")
     }
 
-    /// Eight cycles of 50 ms for 600 ms, of which each register has sent this many; the reply behind the requests was read this late.
+    /// Eight cycles of 50 ms for 600 ms, of which each register has sent this many; the reply after the requests was read this late.
     fn judged(sends: impl Fn(usize) -> u64, late: u64, tolerance: u64) -> Option<Shown> {
         let request = |millis: u64, register: u8, every: u8| {
             (
@@ -231,7 +231,7 @@ mod tests {
             Some(Shown::Lost(Some(0x79), _))
         ));
         assert!(matches!(judged(|_| 24, 0, 20), Some(Shown::Wrong(_))));
-        // It may have begun only when the reply behind its request came.
+        // It may have begun only when the reply after its request came.
         assert_eq!(judged(six, 590, 20), Some(Shown::Right));
     }
 

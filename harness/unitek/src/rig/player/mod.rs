@@ -72,7 +72,7 @@ struct Other {
     phase: Span,
     /// The properties of the drive at a place, in place of those that are known.
     drive: Option<(usize, Properties)>,
-    /// Whether lines are played behind one that is not met.
+    /// Whether lines are played after one that is not met.
     goes_on: bool,
 }
 

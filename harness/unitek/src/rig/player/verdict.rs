@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 /// Why a line that was not met accuses nothing.
 const RIGHT_ALL_THE_SAME: &str = "right drives with these registers send the same, with frames as late as these and their clocks anywhere: the line is not met for that reason alone";
 
-/// In how many attempts at a scenario, one behind the other, an adapter may have lost a frame of the same register.
+/// In how many attempts at a scenario, one after the other, an adapter may have lost a frame of the same register.
 const LOST_BY_THE_ADAPTER: usize = 2;
 
 /// Why a line that was not met accuses nothing, where right drives were compared.

@@ -227,7 +227,7 @@ impl Player {
         let asked = expected.and_then(|frame| frame.data().first().copied());
         match register {
             Some(_) => Shown::Lost(register, format!("{why}: {LOST}")),
-            // The drives were made ready, and what the scenario sends has too many worlds behind a loss.
+            // The drives were made ready, and what the scenario sends has too many worlds after a loss.
             None if unclear && asked.is_some_and(|first| talk.asks_before_it_began(first)) => {
                 Shown::Unknown(TOO_MANY)
             }

@@ -26,7 +26,7 @@ const SWITCHED_ON: Span = Span::from_millis(10_000);
 /// The idle time in front of a telegram, and where a stream parts one.
 const IDLE: Span = Span::from_millis(1);
 
-/// Parameters that only the slave knows: warnings, hours, version and temperature, and behind them the fault memory, of which only the last
+/// Parameters that only the slave knows: warnings, hours, version and temperature, and after them the fault memory, of which only the last
 /// fault is read (5.7).
 const UNCOMPARED: [u16; 10] = [1807, 1808, 1812, 1825, 1801, 1802, 1803, 1804, 1805, 1806];
 
@@ -56,7 +56,7 @@ pub(super) struct Piece {
     pub(super) octets: Vec<u16>,
     /// What came is no telegram.
     pub(super) damaged: bool,
-    /// Something stood behind the telegram that it answers: its reply need not have come to its end.
+    /// Something stood after the telegram that it answers: its reply need not have come to its end.
     pub(super) begun: bool,
     /// The reply to it is not compared.
     unread: bool,
@@ -148,7 +148,7 @@ pub(super) struct Line<const SCAN: u64> {
     uncompared: &'static [u16],
     /// Whether the slave was without a fault, so that a present one has come since.
     worked: bool,
-    /// Whether a fault has come in this conversation: what is kept of it is compared behind its acknowledgement too.
+    /// Whether a fault has come in this conversation: what is kept of it is compared after its acknowledgement too.
     failed: bool,
     /// Their clock.
     now: Instant,
@@ -186,7 +186,7 @@ impl<const SCAN: u64> Line<SCAN> {
         }
     }
 
-    /// Octets reach the slaves now, behind a pause on the line.
+    /// Octets reach the slaves now, after a pause on the line.
     fn takes(&mut self, octets: &[u8], pause: Span) {
         let octet = HEARD_AT.octet_time();
         let begin = self.free + pause;

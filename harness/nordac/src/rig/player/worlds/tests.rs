@@ -104,7 +104,7 @@ fn stands_still(slave: &Known, text: &'static str) {
             let before = place.checked_sub(1).and_then(|place| right[place].read);
             early[place].left = (right[place].left - pause).max(before.unwrap_or_default());
             assert_eq!(judged(&early), Ok(()), "{place} {millis}");
-            // The reply was read long behind it was there.
+            // The reply was read long after it was there.
             let mut late = right.clone();
             late[place].read = late[place].read.map(|read| read + pause);
             for turn in &mut late[place + 1..] {
@@ -123,7 +123,7 @@ fn stands_still(slave: &Known, text: &'static str) {
     }
 }
 
-/// A reply that the computer has read behind its next telegram.
+/// A reply that the computer has read after its next telegram.
 #[test]
 fn a_reply_may_be_read_late() {
     let mut late = turns(&known(&[]));
@@ -211,7 +211,7 @@ fn a_line_that_loses_something_accuses_no_slave() {
         cut[place].came.pop();
         let mut changed = right.clone();
         changed[place].came[0] ^= 1;
-        // The bench does not wait for what comes behind the damage.
+        // The bench does not wait for what comes after the damage.
         let mut slipped = right.clone();
         let mut came = slipped[place].came.split_off(1);
         came.drain(..came.len().min(1));
@@ -294,7 +294,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
     }
 }
 
-/// An octet behind a reply was not lost, and no reply is there that the line has changed.
+/// An octet after a reply was not lost, and no reply is there that the line has changed.
 #[test]
 fn a_line_adds_nothing() {
     let kinds = |octets: &[u16]| -> Vec<_> {
