@@ -32,7 +32,6 @@ pub(crate) struct SlaveSetup {
     pub(crate) address: u8,
     /// The PPO type that it is set to.
     pub(crate) ppo: PpoType,
-    /// Whether it has the PosiCon option.
     pub(crate) posicon: bool,
     pub(crate) properties: Properties,
     /// Parameters that differ from the factory settings, and their values.

@@ -33,17 +33,6 @@ impl SegmentGate {
         }
     }
 
-    /// What it knows of the drives.
-    #[must_use]
-    pub(crate) const fn known(&self) -> &guard::Gate {
-        &self.gate
-    }
-
-    /// The same, to tell it what was read.
-    pub(crate) const fn known_mut(&mut self) -> &mut guard::Gate {
-        &mut self.gate
-    }
-
     fn admit_frame(&mut self, now: Instant, frame: &Frame) -> Result<(), Denied> {
         if self.listen_only {
             let why = format!("{frame} is not sent: the rig's file says `listen_only = true`");
@@ -194,11 +183,11 @@ pub(crate) trait GuardsSegment {
 
 impl<L: Line> GuardsSegment for Guarded<L> {
     fn segment(&self) -> Option<&guard::Gate> {
-        self.gate::<SegmentGate>(0).map(SegmentGate::known)
+        self.gate::<SegmentGate>(0).map(|gate| &gate.gate)
     }
 
     fn segment_mut(&mut self) -> Option<&mut guard::Gate> {
-        self.gate_mut::<SegmentGate>(0).map(SegmentGate::known_mut)
+        self.gate_mut::<SegmentGate>(0).map(|gate| &mut gate.gate)
     }
 }
 

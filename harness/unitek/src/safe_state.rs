@@ -132,7 +132,6 @@ pub(crate) fn safe_state<L: Line>(
     }
 }
 
-/// What became of a drive.
 struct Report {
     end: End,
     words: String,

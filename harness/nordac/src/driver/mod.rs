@@ -74,7 +74,6 @@ struct Slave {
     event: Option<PeripheralEvent>,
 }
 
-/// What a start has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct StartReport {
     pub(crate) ppo: PpoType,
@@ -436,7 +435,6 @@ impl<'l> Driver<'l> {
         (0..self.slaves.len()).try_for_each(|place| self.exchanges(place))
     }
 
-    /// Whether a slave still exchanges data.
     fn exchanges(&mut self, place: usize) -> Result<(), Error> {
         let started = &self.slaves[place];
         if started.exchanges == 0 || self.master.get_mut(started.handle).is_running() {

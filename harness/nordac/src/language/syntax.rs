@@ -35,7 +35,6 @@ pub(crate) enum SetupKind {
     There {
         /// The PPO type that it is set to.
         ppo: Option<PpoType>,
-        /// Whether it has the PosiCon option.
         posicon: bool,
     },
     /// `property pzd-invalid = hold`.
@@ -86,7 +85,6 @@ pub(crate) enum ValueKind {
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub(crate) octets: Pattern,
-    /// What is wrong with some of them.
     pub(crate) bad: Vec<Bad>,
 }
 
@@ -191,7 +189,6 @@ pub(crate) enum JobKind {
     Exchange {
         /// What is sent; words that are left out stay as they are.
         send: Vec<(WordName, WordValue)>,
-        /// What the reply must hold.
         expect: Vec<(WordName, WordValue)>,
     },
     /// `read 8 1202 = 5s`.

@@ -17,7 +17,7 @@ use std::io::Write;
 /// Writes the table.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     writeln!(out, "t_ns,from,to,bytes,error,service,meaning")?;
     for trace in traces {

@@ -58,7 +58,7 @@ fn sender<S: Serializer>(from: &Option<u8>, serializer: S) -> Result<S::Ok, S::E
 /// Writes the object.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let bytes = traces
         .iter()

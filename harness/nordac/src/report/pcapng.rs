@@ -8,7 +8,7 @@ use std::io::Write;
 /// Writes the capture.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn write(traces: &[Trace], out: impl Write) -> std::io::Result<()> {
     let runs: Vec<_> = traces.iter().flat_map(runs).collect();
     let telegrams: Vec<_> = runs

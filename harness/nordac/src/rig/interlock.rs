@@ -67,13 +67,12 @@ impl InverterInterlock {
             _ => Vec::new(),
         };
         let condition = interlock.condition_of("parameter", &bits, |text| bound(text, cell))?;
-        let every = u64::try_from(interlock.every.0.as_nanos()).unwrap_or(u64::MAX);
         Ok(Self {
             slave: interlock.drive,
             cell,
             condition,
             interlock: interlock.clone(),
-            every: Span::from_nanos(every),
+            every: interlock.every.span(),
             next: Instant::START,
         })
     }

@@ -36,7 +36,6 @@ pub(crate) enum TalkError {
     Unexpected {
         slave: u8,
         service: &'static str,
-        /// What it replies, in words.
         found: String,
     },
     #[error("slave {slave}: {why}")]

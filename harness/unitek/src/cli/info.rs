@@ -55,7 +55,6 @@ static FORM: TopForm = TopForm {
     ],
 };
 
-/// What is shown of drives.
 pub(super) fn info(session: &mut Session, drives: &[Axis]) -> Result<Vec<DriveInfo>, Failure> {
     let registers = SHOWN.map(|(_, register)| Register::of(register));
     let found = UnitekDrives::read(session, drives, &registers)?;

@@ -10,7 +10,6 @@ use harness_proto::unitek::words::set_bits;
 use harness_proto::unitek::{Data, Register};
 use serde_json::{Value, json};
 
-/// What was read of a register.
 pub(crate) struct RegisterReading {
     pub(super) axis: Axis,
     pub(super) reply: Reply,

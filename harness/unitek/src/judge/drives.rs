@@ -51,7 +51,6 @@ impl JudgedDrives {
     }
 }
 
-/// What was heard on a bus.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeardFrames<'f> {
     /// The frames, in order.

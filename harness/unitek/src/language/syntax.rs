@@ -50,7 +50,6 @@ pub(crate) enum SetupKind {
     Outside(Outside),
 }
 
-/// What a property is set to.
 #[derive(Clone, Debug)]
 pub(crate) enum PropertyValue {
     /// A word, or the two digits of a byte.
@@ -144,7 +143,6 @@ pub(crate) enum FrameStep {
     Master(JobStep),
 }
 
-/// What happens to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameHarm {
     Lost,
@@ -156,7 +154,6 @@ pub(crate) enum FrameHarm {
     BusOff,
 }
 
-/// What happens to a drive as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DriveHarm {
     Off,

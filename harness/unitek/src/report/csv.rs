@@ -16,7 +16,7 @@ use std::io::Write;
 /// Writes the table.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     writeln!(out, "t_ns,from,id,remote,dlc,data,ended,meaning")?;
     let channels = traces.iter().flat_map(|trace| &trace.channels);

@@ -57,7 +57,7 @@ fn frames(traces: &[Trace]) -> impl Iterator<Item = &LineFrame> {
 /// Writes the object.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let frames = frames(traces).map(|frame| FrameObject {
         t_ns: frame.at.since_start().as_nanos(),
@@ -86,7 +86,7 @@ pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std:
 /// last bit in seconds.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub(crate) fn candump(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     for frame in frames(traces).filter(|frame| frame.ended == FrameEnd::Good) {
         let micros = frame.at.since_start().as_nanos() / 1000;

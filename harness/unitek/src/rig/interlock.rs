@@ -129,14 +129,13 @@ impl RegisterInterlocks {
         let entry = |interlock: &Interlock| {
             // The file was checked.
             let (register, condition) = read(interlock).ok()?;
-            let every = u64::try_from(interlock.every.0.as_nanos()).unwrap_or(u64::MAX);
             let axis = axes.iter().find(|axis| axis.node == interlock.drive)?;
             Some(RegisterInterlock {
                 axis: *axis,
                 register,
                 condition,
                 interlock: interlock.clone(),
-                every: Span::from_nanos(every),
+                every: interlock.every.span(),
                 next: Instant::START,
                 scaling: None,
                 sends_itself: false,

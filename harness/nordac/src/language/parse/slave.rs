@@ -11,7 +11,6 @@ use harness_proto::nordac::Properties;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
 use harness_sim::nordac::deviation::{Deviation, deviations};
 
-/// What a line about a slave is.
 pub(super) enum SlaveLine {
     /// A header line.
     Setup(SetupKind),

@@ -77,7 +77,6 @@ pub(crate) enum PlannedJob {
     /// One Data_Exchange.
     Exchange {
         send: Vec<(WordName, PlannedWord)>,
-        /// What the reply must hold.
         expect: Vec<(WordName, PlannedWord)>,
     },
     Read(PlannedParameter, Option<PlannedWanted>),

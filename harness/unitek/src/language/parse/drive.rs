@@ -12,7 +12,6 @@ use harness_proto::unitek::properties::{Accepts, Description, PROFILES, PROPERTI
 use harness_sim::unitek::deviation::{Deviation, deviations};
 use harness_sim::unitek::{Control, Inputs};
 
-/// What a line about a drive is.
 pub(super) enum DriveLine {
     /// A header line.
     Setup(SetupKind),
