@@ -25,8 +25,8 @@ impl HeldBefore {
         let rate = session.rig().port().map(rate).unwrap_or_default();
         let gate = session.guarded().slaves();
         let limits = gate.map_or_else(Limits::default, |gate| *gate.limits());
-        let nothing = (Vec::new(), false);
-        let mut player = Player::of(slaves.clone(), rate, session.patience(), limits, nothing);
+        let (patience, all) = (session.patience(), slaves.clone());
+        let mut player = Player::of(all, rate, patience, limits, Vec::new(), false);
         let mut talk = session.talk();
         let mut all = Vec::new();
         for slave in slaves {

@@ -43,7 +43,6 @@ pub(crate) const MASTER: u8 = 2;
 /// The address of the first simulated slave.
 const FIRST: u8 = 8;
 
-/// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
     bus: PortBus::Nordac,
     adapters: &["serial", "tcp", "port"],
@@ -67,7 +66,6 @@ pub(crate) const PORT: PortRow = PortRow {
     interlock: ("parameter", interlock::checked),
 };
 
-/// Commands on rigs of this bus.
 pub(crate) const COMMANDS: RigCommands = RigCommands::of_port::<Inverters, Nordac>();
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
@@ -92,7 +90,6 @@ const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
     }
 }
 
-/// A slave of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RigSlave {
     /// Its address, 1 to 126.
@@ -121,7 +118,6 @@ pub(crate) fn slaves(port: &Port) -> Vec<RigSlave> {
     .collect()
 }
 
-/// The bit rate of a port.
 #[must_use]
 pub(crate) fn rate(port: &Port) -> BusRate {
     // The file was checked.
@@ -139,18 +135,18 @@ pub(crate) fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
         let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default().number());
         format!("slave {address} ppo {ppo}\nslave {address} parameter 1621 = 2\n")
     });
-    let own = Source {
+    let base = Source {
         name: "setup".to_owned(),
         text: lines.collect::<String>().into(),
     };
-    let mut scenario: Scenario<Nordac> = read(&own, Part::Header)?;
+    let mut scenario: Scenario<Nordac> = read(&base, Part::Header)?;
     let more: Scenario<Nordac> = read(source, Part::Header)?;
     scenario.header.slaves.extend(more.header.slaves);
     scenario.header.master = more.header.master;
     scenario.steps.clear();
     let setup = settle(&scenario, source, None)?.setup;
-    let there = |address: u8| slaves.iter().any(|own| own.address == address);
-    if let Some(other) = setup.slaves.iter().find(|own| !there(own.address)) {
+    let there = |address: u8| slaves.iter().any(|slave| slave.address == address);
+    if let Some(other) = setup.slaves.iter().find(|slave| !there(slave.address)) {
         let message = format!("the port has no slave {}", other.address);
         let problem = Problem::new(
             TextSpan::default(),
@@ -175,9 +171,9 @@ const MOST_NUMBERS: u8 = 20;
 /// Values of a property: each of its words or numbers; of many numbers some from the least to the most.
 pub(crate) fn values(property: &Description) -> Vec<String> {
     match property.accepts {
-        Accepts::Words(words) => words.iter().map(|own| (*own).to_owned()).collect(),
+        Accepts::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
         Accepts::Count { least, most, .. } if most - least < MOST_NUMBERS => {
-            (least..=most).map(|own| own.to_string()).collect()
+            (least..=most).map(|number| number.to_string()).collect()
         }
         Accepts::Count {
             least,

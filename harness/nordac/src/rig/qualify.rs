@@ -16,7 +16,7 @@ use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
 use include_dir::{Dir, include_dir};
 
-/// The conversations that are played with each slave behind the selected scenarios.
+/// The conversations that are played with each slave after the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/qualify/nordac");
 
 /// What stands in a conversation for the address of a slave, the octets DA without and with a SAP, and its PPO type.
@@ -89,7 +89,6 @@ const NEEDS: [(&str, ProbeNeeds, &str); 38] = [
     ("reinit", ProbeNeeds::Never, ""),
 ];
 
-/// Why a property is not settled.
 fn why_open(property: &Description, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
     let why = match needs.map_or(ProbeNeeds::Nothing, |(_, needs, _)| *needs) {
@@ -132,7 +131,7 @@ fn with_slave(text: &str, slave: &RigSlave) -> String {
         Some((before, behind)) => {
             let octets = before.split(' ').skip(1);
             let octets: Vec<_> = octets
-                .filter_map(|own| u8::from_str_radix(own, 16).ok())
+                .filter_map(|octet| u8::from_str_radix(octet, 16).ok())
                 .collect();
             // Behind the start of SD1 or of SD2.
             let from = if octets.first() == Some(&SD1) { 1 } else { 4 };
@@ -153,7 +152,7 @@ pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
     let kept = slaves.iter().flat_map(of_slave);
     let walks = walks(rig).into_iter();
     let walks = walks
-        .flat_map(|(slave, own)| own.conversations(CONVERSATION, |lines| walked(slave, lines)));
+        .flat_map(|(slave, walk)| walk.conversations(CONVERSATION, |lines| walked(slave, lines)));
     kept.chain(walks).collect()
 }
 
@@ -181,7 +180,7 @@ fn walks(rig: &Rig) -> Vec<(RigSlave, DriveWalk<State>)> {
 pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) -> Qualified {
     let notes = parts.iter().map(|player| {
         let notes = player.notes().iter();
-        let notes = notes.filter(|own| own.shows_something());
+        let notes = notes.filter(|note| note.shows_something());
         notes.collect::<Vec<_>>()
     });
     let notes: Vec<_> = notes.collect();
@@ -194,11 +193,11 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     });
     let known: Vec<_> = known.collect();
     let walks = walks(rig);
-    let walks = walks.iter().map(|own| &own.1);
+    let walks = walks.iter().map(|walk| &walk.1);
     let attempts = Attempts::new(&notes, walks, &names());
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
-    let named = rig.file.deviation.iter().map(|own| own.name.clone());
+    let named = rig.file.deviation.iter().map(|wrong| wrong.name.clone());
     let named: Vec<_> = named.collect();
     qualified(&attempts, profile, "telegram", &named, whole)
 }
@@ -207,7 +206,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
 fn settle(slaves: &mut [Known], place: usize, notes: &[&SlaveNote]) {
     let address = slaves[place].slave.address;
     for (name, _, conversation) in NEEDS {
-        let property = Description::of(name).filter(|own| !slaves[place].is_settled(own));
+        let property = Description::of(name).filter(|property| !slaves[place].is_settled(property));
         let Some(property) = property else { continue };
         let shown = format!("{CONVERSATION}{conversation}");
         let of_slave = format!("{shown}-slave-{address}");
@@ -240,7 +239,7 @@ mod tests {
     use super::*;
     use crate::BUSES;
     use crate::gate::guarded;
-    use crate::rig::player::Own;
+    use crate::rig::player::RigScenario;
     use crate::simulate::{Bench, Setup, SlaveSetup};
     use harness_bench::link::Link as _;
     use harness_bench::rig::find;
@@ -270,7 +269,7 @@ mod tests {
             name: format!("{CONVERSATION}tasks"),
             text: with_slave(text, &all[0]).into(),
         };
-        let own = Arc::new(Own::read(&source).expect("a scenario"));
+        let scenario = Arc::new(RigScenario::read(&source).expect("a scenario"));
         let setup = Setup {
             rate: BusRate::K500,
             slaves: vec![SlaveSetup::new(all[0].address)],
@@ -278,11 +277,11 @@ mod tests {
         };
         let limits = Limits::default();
         let mut link = guarded(Bench::new(&setup), limits, &[all[0].into()], false);
-        let able = (link.capabilities().to_vec(), true);
+        let able = link.capabilities().to_vec();
         let patience = Span::from_millis(5);
-        let mut player = Player::of(all, BusRate::K500, patience, limits, able);
+        let mut player = Player::of(all, BusRate::K500, patience, limits, able, true);
         player.qualify();
-        let (outcome, _) = player.attempt(&own, &mut link);
+        let (outcome, _) = player.attempt(&scenario, &mut link);
         assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
         let made = qualify(&[&player], &rig, "", true);
         let profile = made.profile.expect("the slave was asked");
@@ -304,7 +303,7 @@ mod tests {
                     name,
                     text: text.into(),
                 };
-                Own::read(&source).expect("a scenario");
+                RigScenario::read(&source).expect("a scenario");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! NORDAC inverters on which scenarios are played: what their player offers, and what is set back after a scenario.
 
-use super::player::{Own, Player};
+use super::player::{Player, RigScenario};
 use super::profile::ProfileSettings;
 use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
@@ -25,7 +25,7 @@ impl PortPlayer for Player {
     const BUS: BusName = BusName::Nordac;
     const ANEW: bool = true;
     type Drives = Inverters;
-    type Own = Own;
+    type Own = RigScenario;
 
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let port = rig.port();
@@ -34,10 +34,8 @@ impl PortPlayer for Player {
             port.map(rate).unwrap_or_default(),
             port.map_or(Span::ZERO, |port| patience_of(rig, port)),
             limits(rig, allow_motion),
-            (
-                Self::segment(rig, allow_motion).capabilities,
-                rig.is_simulated(),
-            ),
+            Self::segment(rig, allow_motion).capabilities,
+            rig.is_simulated(),
         );
         if qualifies {
             player.qualify();
@@ -62,15 +60,15 @@ impl PortPlayer for Player {
         RecordedBench::of(rig, (rate, TOLERANCE), &Bench::CAPABILITIES, permitted)
     }
 
-    fn read(source: &Source) -> Result<Own, Box<Problems>> {
-        Own::read(source)
+    fn read(source: &Source) -> Result<RigScenario, Box<Problems>> {
+        RigScenario::read(source)
     }
 
-    fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+    fn not_begun(&self, scenario: &RigScenario) -> Option<Skip> {
         Self::not_begun(self, scenario)
     }
 
-    fn disturbs(scenario: &Own) -> bool {
+    fn disturbs(scenario: &RigScenario) -> bool {
         let faults = [
             Capability::Power,
             Capability::Interposer,
@@ -90,11 +88,11 @@ impl PortPlayer for Player {
         Self::replay(self, events, tolerance)
     }
 
-    fn attempt(&mut self, scenario: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+    fn attempt(&mut self, scenario: &Arc<RigScenario>, link: &mut dyn Link) -> (Outcome, String) {
         Self::attempt(self, scenario, link)
     }
 
-    fn set_back(&mut self, _: &Own, session: &mut Session) -> Vec<String> {
+    fn set_back(&mut self, _: &RigScenario, session: &mut Session) -> Vec<String> {
         let origin = session.rig().origin.clone();
         self.put_back(session.link(), &origin)
     }

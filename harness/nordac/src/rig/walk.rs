@@ -296,7 +296,7 @@ pub(super) fn names() -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::player::Own;
+    use crate::rig::player::RigScenario;
     use crate::simulate::{Bench, Setup};
     use harness_bench::link::Link as _;
     use harness_bench::scenario::run::{AtMismatch, play};
@@ -349,7 +349,7 @@ mod tests {
                 name: "walk".to_owned(),
                 text: walked(SLAVE, &part.lines).into(),
             };
-            let own = Own::read(&source).expect("a conversation");
+            let own = RigScenario::read(&source).expect("a conversation");
             let mut slaves = own.plan.setup.slaves.clone();
             slaves[0].deviation = deviates.map(|name| deviation(name).expect("a deviation"));
             let rate = BusRate::K500;

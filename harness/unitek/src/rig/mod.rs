@@ -32,7 +32,6 @@ use harness_bench::scenario::source::Source;
 use harness_proto::can::BitRate;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 
-/// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
     bus: PortBus::Unitek,
     adapters: &["slcan", "socketcand", "socketcan"],
@@ -59,7 +58,6 @@ pub(crate) const PORT: PortRow = PortRow {
     interlock: ("register", interlock::checked),
 };
 
-/// Commands on rigs of this bus.
 pub(crate) const COMMANDS: RigCommands = RigCommands::of_port::<UnitekDrives, Unitek>();
 
 fn simulated(drives: u8) -> (String, String) {
@@ -103,9 +101,9 @@ pub(crate) fn drive(index: usize, node: Node) -> (u8, (u16, u16)) {
     let place = u8::try_from(index + 1).unwrap_or(u8::MAX);
     let number = node.node.unwrap_or(place);
     let offset = u16::from(number) - 1;
-    let own = (node.rx, node.tx);
-    let rx = own.0.unwrap_or(DEFAULT_RX + offset);
-    let tx = own.1.unwrap_or(DEFAULT_TX + offset);
+    let given = (node.rx, node.tx);
+    let rx = given.0.unwrap_or(DEFAULT_RX + offset);
+    let tx = given.1.unwrap_or(DEFAULT_TX + offset);
     (number, (rx, tx))
 }
 
@@ -120,7 +118,6 @@ pub(crate) fn axes(port: &Port) -> Vec<Axis> {
     .collect()
 }
 
-/// The bit rate of a port.
 #[must_use]
 pub(crate) fn rate(port: &Port) -> BitRate {
     // The file was checked.

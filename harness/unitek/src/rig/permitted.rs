@@ -96,16 +96,16 @@ fn special_register(text: &str) -> Result<u8, (String, String)> {
 /// What a rig's file and the command line allow together.
 #[must_use]
 pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
-    let own = &rig.file.limits;
-    let named = own.port.allow_registers.iter();
+    let granted = &rig.file.limits;
+    let named = granted.port.allow_registers.iter();
     Limits {
-        motion: own.allow_motion && (allow_motion || rig.is_simulated()),
-        eeprom: own.allow_eeprom,
-        bus_settings: own.port.allow_bus_settings,
-        way_back: own.port.bit_rate_way_back.is_some(),
-        store_bus_settings: own.port.store_bus_settings.is_some(),
-        other_identifiers: own.port.allow_other_identifiers,
-        max_speed: own.max_speed.map(|most| match most {
+        motion: granted.allow_motion && (allow_motion || rig.is_simulated()),
+        eeprom: granted.allow_eeprom,
+        bus_settings: granted.port.allow_bus_settings,
+        way_back: granted.port.bit_rate_way_back.is_some(),
+        store_bus_settings: granted.port.store_bus_settings.is_some(),
+        other_identifiers: granted.port.allow_other_identifiers,
+        max_speed: granted.max_speed.map(|most| match most {
             // Rounded down.
             MaxSpeed::Rpm(speed) => {
                 guard::HighestSpeed::Rpm(speed.0.clamp(0.0, 65_535.0).floor() as u16)

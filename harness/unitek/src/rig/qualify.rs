@@ -17,7 +17,7 @@ use harness_proto::unitek::properties::{Description, PROPERTIES};
 use include_dir::{Dir, include_dir};
 use std::ops::RangeInclusive;
 
-/// The conversations that are played with each drive behind the selected scenarios.
+/// The conversations that are played with each drive after the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/qualify/unitek");
 
 /// What stands in a conversation for the number and the identifiers of a drive, the two bytes of each of them, the next higher one, and
@@ -86,7 +86,6 @@ const NEEDS: [(&str, Needs, &str); 14] = [
     ("second-identifiers", Needs::BusSettingsAndPowerUp, ""),
 ];
 
-/// Why a property is not settled.
 fn why_open(property: &Description, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
     let why = match needs.map_or(Needs::Nothing, |(_, needs, _)| *needs) {
@@ -117,22 +116,22 @@ fn why_open(property: &Description, limits: &Limits) -> String {
 /// Two identifiers for a drive to be tried with, which no drive of the rig uses, and which are those of no other drive either: one as
 /// printed (UNITEK 3.1), while there are some left, and one that is not.
 pub(super) fn free(axes: &[Axis], axis: Axis) -> [u16; 2] {
-    let place = axes.iter().position(|own| *own == axis).unwrap_or(0);
-    let used = |id: &u16| axes.iter().any(|own| own.rx == *id || own.tx == *id);
+    let place = axes.iter().position(|other| *other == axis).unwrap_or(0);
+    let used = |id: &u16| axes.iter().any(|axis| axis.rx == *id || axis.tx == *id);
     let other = || (0x100..=0x7FF).filter(|id| !PRINTED.contains(id) && !used(id));
     // Not the last one, which is the highest neighbour that a drive may hear.
     let printed = PRINTED.rev().skip(1).filter(|id| !used(id));
     let free = printed.chain(other().skip(axes.len())).nth(place);
-    [free, other().nth(place)].map(|own| own.unwrap_or(axis.rx))
+    [free, other().nth(place)].map(|id| id.unwrap_or(axis.rx))
 }
 
 /// An identifier on which a drive can be tried to send: one that no drive of the rig uses, as printed (UNITEK 3.1) while there are some left.
 fn free_to_send(axes: &[Axis], axis: Axis) -> u16 {
-    let place = axes.iter().position(|own| *own == axis).unwrap_or(0);
-    let tried: Vec<_> = axes.iter().flat_map(|own| free(axes, *own)).collect();
+    let place = axes.iter().position(|other| *other == axis).unwrap_or(0);
+    let tried: Vec<_> = axes.iter().flat_map(|axis| free(axes, *axis)).collect();
     let used = |id: &u16| {
-        let own = axes.iter().any(|own| own.rx == *id || own.tx == *id);
-        own || tried.contains(id)
+        let is_used = axes.iter().any(|axis| axis.rx == *id || axis.tx == *id);
+        is_used || tried.contains(id)
     };
     let sends = PRINTED_TO_SEND.rev().chain(0x100..=0x7FF);
     sends.filter(|id| !used(id)).nth(place).unwrap_or(axis.tx)
@@ -172,8 +171,8 @@ pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
     };
     let kept = axes.iter().flat_map(of_drive);
     let walks = walks(axes, limits).into_iter();
-    let walks =
-        walks.flat_map(|(axis, own)| own.conversations(CONVERSATION, |lines| walked(axis, lines)));
+    let walks = walks
+        .flat_map(|(axis, walk)| walk.conversations(CONVERSATION, |lines| walked(axis, lines)));
     kept.chain(walks).collect()
 }
 
@@ -199,7 +198,7 @@ fn walks(axes: &[Axis], limits: &Limits) -> Vec<(Axis, DriveWalk<State>)> {
 pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) -> Qualified {
     let notes = parts.iter().map(|player| {
         let notes = player.notes().iter();
-        let notes = notes.filter(|own| own.shows_something());
+        let notes = notes.filter(|note| note.shows_something());
         notes.collect::<Vec<_>>()
     });
     let notes: Vec<_> = notes.collect();
@@ -213,11 +212,11 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let known: Vec<_> = known.collect();
     let permitted = limits(rig, rig.file.limits.allow_motion);
     let walks = walks(&rig.port().map(axes).unwrap_or_default(), &permitted);
-    let walks = walks.iter().map(|own| &own.1);
+    let walks = walks.iter().map(|walk| &walk.1);
     let attempts = Attempts::new(&notes, walks, &names(&permitted));
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
-    let named = rig.file.deviation.iter().map(|own| own.name.clone());
+    let named = rig.file.deviation.iter().map(|wrong| wrong.name.clone());
     let named: Vec<_> = named.collect();
     qualified(&attempts, profile, "frame", &named, whole)
 }
@@ -273,15 +272,15 @@ mod tests {
                 tx: 0x180 + u16::from(node),
             };
             let axes: Vec<_> = (1..=drives).map(axis).collect();
-            let tried = axes.iter().flat_map(|own| {
-                let sends = free_to_send(&axes, *own);
-                free(&axes, *own).into_iter().chain([sends])
+            let tried = axes.iter().flat_map(|axis| {
+                let sends = free_to_send(&axes, *axis);
+                free(&axes, *axis).into_iter().chain([sends])
             });
-            let own = axes.iter().flat_map(|own| [own.rx, own.tx]);
-            let all: Vec<_> = tried.chain(own).collect();
+            let used = axes.iter().flat_map(|axis| [axis.rx, axis.tx]);
+            let all: Vec<_> = tried.chain(used).collect();
             let each: std::collections::BTreeSet<_> = all.iter().collect();
             assert_eq!(each.len(), all.len(), "{drives} drives");
-            assert!(all.iter().all(|own| (1..=0x7FF).contains(own)));
+            assert!(all.iter().all(|id| (1..=0x7FF).contains(id)));
         }
     }
 

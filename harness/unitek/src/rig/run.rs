@@ -1,6 +1,6 @@
 //! UNITEK drives on which scenarios are played: what their player offers.
 
-use super::player::{Own, Player, stores};
+use super::player::{Player, RigScenario, stores};
 use super::profile::ProfileSettings;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
@@ -35,7 +35,7 @@ impl PortPlayer for Player {
     const BUS: BusName = BusName::Unitek;
     const ANEW: bool = false;
     type Drives = UnitekDrives;
-    type Own = Own;
+    type Own = RigScenario;
 
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let port = rig.port();
@@ -76,11 +76,11 @@ impl PortPlayer for Player {
         RecordedBench::of(rig, (rate, SLACK), &Bench::CAPABILITIES, permitted)
     }
 
-    fn read(source: &Source) -> Result<Own, Box<Problems>> {
-        Own::read(source)
+    fn read(source: &Source) -> Result<RigScenario, Box<Problems>> {
+        RigScenario::read(source)
     }
 
-    fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+    fn not_begun(&self, scenario: &RigScenario) -> Option<Skip> {
         Self::not_begun(self, scenario)
     }
 
@@ -89,7 +89,7 @@ impl PortPlayer for Player {
     }
 
     /// Waits until 84 may be written again, as the guard sees it.
-    fn wait(&mut self, scenario: &Own, link: &mut dyn Link) {
+    fn wait(&mut self, scenario: &RigScenario, link: &mut dyn Link) {
         let Some(stores) = scenario.frames().find(|frame| stores(frame)) else {
             return;
         };
@@ -105,12 +105,12 @@ impl PortPlayer for Player {
         }
     }
 
-    fn attempt(&mut self, scenario: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+    fn attempt(&mut self, scenario: &Arc<RigScenario>, link: &mut dyn Link) -> (Outcome, String) {
         Self::attempt(self, scenario, link)
     }
 
     /// Sets registers back that a scenario has changed.
-    fn set_back(&mut self, scenario: &Own, session: &mut Session) -> Vec<String> {
+    fn set_back(&mut self, scenario: &RigScenario, session: &mut Session) -> Vec<String> {
         if scenario.frames().any(stores) {
             self.note_stored();
         }

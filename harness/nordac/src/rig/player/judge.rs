@@ -3,7 +3,7 @@
 use super::note::kind;
 use super::rehearse::Other;
 use super::worlds::{Divergence, MOST_LOST, TOO_MANY, right_slaves_send};
-use super::{AttemptEvidence, Own, Player};
+use super::{AttemptEvidence, Player, RigScenario};
 use crate::rig::known::value_of;
 use crate::rig::observed::{ReceivedOctets, Turn};
 use crate::rig::settle::{Assumptions, search};
@@ -26,7 +26,7 @@ impl Player {
     /// The outcome where the slaves could not be made ready.
     pub(super) fn unanswered(
         &mut self,
-        scenario: &Own,
+        scenario: &RigScenario,
         error: &TalkError,
         left: &AttemptEvidence,
     ) -> Outcome {
@@ -67,7 +67,7 @@ impl Player {
     }
 
     /// What no right slave sends, where nothing that the line has lost or a stream has parted explains it.
-    fn differs(&mut self, scenario: &Own, left: &AttemptEvidence) -> Option<Divergence> {
+    fn differs(&mut self, scenario: &RigScenario, left: &AttemptEvidence) -> Option<Divergence> {
         let turns = &left.turns;
         let sent = right_slaves_send(self.known(), self.rate, 0, turns, &self.beats);
         let differs = sent.err().filter(|differs| differs.open.is_none())?;
@@ -77,7 +77,7 @@ impl Player {
     /// Whether a line that was not met accuses the slave; behind an adapter, whether anything that it sent does.
     pub(super) fn judged(
         &mut self,
-        scenario: &Own,
+        scenario: &RigScenario,
         outcome: Outcome,
         left: &AttemptEvidence,
     ) -> Outcome {
@@ -105,7 +105,7 @@ impl Player {
     /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
     fn judged_by_times(
         &mut self,
-        scenario: &Own,
+        scenario: &RigScenario,
         outcome: Outcome,
         left: &AttemptEvidence,
     ) -> Outcome {
@@ -166,7 +166,7 @@ impl Player {
 
     /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
     /// there in the two attempts before is not lost by the line.
-    fn lost(&mut self, scenario: &Own, turns: &[Turn]) -> Option<String> {
+    fn lost(&mut self, scenario: &RigScenario, turns: &[Turn]) -> Option<String> {
         let sent = right_slaves_send(self.known(), self.rate, MOST_LOST, turns, &self.beats);
         let lost = match sent {
             Ok(lost) => lost,
@@ -199,7 +199,7 @@ impl Player {
     }
 
     /// The same as [`Self::explained`], unless a slave was proven wrong before.
-    fn excused(&mut self, scenario: &Own, left: &AttemptEvidence) -> Option<String> {
+    fn excused(&mut self, scenario: &RigScenario, left: &AttemptEvidence) -> Option<String> {
         if self.proven {
             return None;
         }
@@ -209,7 +209,7 @@ impl Player {
     }
 
     /// In what right slaves that send the very same octets differ from what is known of the slaves; `None` if no right slaves send them.
-    fn explained(&self, scenario: &Own, left: &AttemptEvidence) -> Option<String> {
+    fn explained(&self, scenario: &RigScenario, left: &AttemptEvidence) -> Option<String> {
         let base: Assumptions = self.known().iter().map(|known| known.properties).collect();
         let open: Vec<Vec<_>> = self
             .known()

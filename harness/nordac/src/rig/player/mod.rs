@@ -27,6 +27,7 @@ use super::talk::{Talk, TalkError};
 use crate::gate::GuardsSlaves as _;
 use crate::gate::guarded;
 use crate::language::Nordac;
+use crate::language::syntax::Header;
 use crate::simulate::{self, Bench};
 use harness_bench::guard::Guarded;
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Replay};
@@ -51,22 +52,21 @@ use harness_sim::nordac::History;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// A scenario of this bus.
+/// A scenario, read for a rig.
 #[derive(Clone, Debug)]
-pub(crate) struct Own {
+pub(crate) struct RigScenario {
     name: String,
-    scenario: Scenario<Nordac>,
+    header: Header,
     pub(super) plan: Plan<Nordac>,
 }
 
-impl Own {
+impl RigScenario {
     pub(super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Nordac> = parse(source)?;
         let plan = plan(&scenario, source, None)?;
-        let name = source.name.clone();
         Ok(Self {
-            name,
-            scenario,
+            name: source.name.clone(),
+            header: scenario.header,
             plan,
         })
     }
@@ -135,7 +135,7 @@ struct ReadySlaves {
     /// Whether settings of the bus were switched for it.
     switches: bool,
     /// The scenario with shorter waits, which is played in its place.
-    shorter: Option<Own>,
+    shorter: Option<RigScenario>,
     faulted: bool,
 }
 
@@ -145,7 +145,8 @@ impl Player {
         rate: BusRate,
         patience: Span,
         limits: Limits,
-        (capabilities, restarts): (Vec<Capability>, bool),
+        capabilities: Vec<Capability>,
+        restarts: bool,
     ) -> Self {
         Self {
             slaves,
@@ -199,7 +200,7 @@ impl Player {
     }
 
     /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
-    pub(super) fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+    pub(super) fn not_begun(&self, scenario: &RigScenario) -> Option<Skip> {
         lacks(&scenario.plan, &self.replay(&[], Span::ZERO))
     }
 
@@ -224,7 +225,7 @@ impl Player {
     /// scenario, in words.
     pub(super) fn attempt(
         &mut self,
-        scenario: &Arc<Own>,
+        scenario: &Arc<RigScenario>,
         link: &mut dyn Link,
     ) -> (Outcome, String) {
         link.begin();
@@ -278,7 +279,7 @@ impl Player {
     /// switched or not. With whether settings were switched.
     fn go(
         &mut self,
-        scenario: &Own,
+        scenario: &RigScenario,
         link: &mut Observed<'_>,
         again: Option<bool>,
     ) -> (AttemptCourse, bool) {
@@ -317,7 +318,7 @@ impl Player {
     /// What becomes of the attempt, and whether settings were switched.
     fn made_ready(
         &mut self,
-        scenario: &Own,
+        scenario: &RigScenario,
         link: &mut Observed<'_>,
         again: Option<bool>,
     ) -> Result<ReadySlaves, Box<(AttemptCourse, bool)>> {
@@ -402,7 +403,7 @@ impl Player {
     }
 
     /// Reads what the slaves of a scenario keep of the time before. Simulated ones are switched off and on for each scenario.
-    fn look(&mut self, scenario: &Own, link: &mut Observed<'_>) -> Result<(), TalkError> {
+    fn look(&mut self, scenario: &RigScenario, link: &mut Observed<'_>) -> Result<(), TalkError> {
         if self.restarts {
             return Ok(());
         }

@@ -4,7 +4,7 @@
 //! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
 
 use super::worlds::{could_send, right_slaves_send};
-use super::{AttemptCourse, Own, Player};
+use super::{AttemptCourse, Player, RigScenario};
 use crate::rig::known::{INTERFACE, Known, Values, stated};
 use crate::rig::observed::{Agreement, Observed, ReceivedOctets, Turn, WHOLE};
 use crate::rig::settle::{Assumptions, search};
@@ -36,7 +36,7 @@ pub(crate) enum Other {
 
 #[derive(Clone, Debug)]
 pub(crate) struct SlaveNote {
-    own: Arc<Own>,
+    scenario: Arc<RigScenario>,
     /// What was known when it began.
     begun: Player,
     /// What was known of the slaves in it.
@@ -318,10 +318,10 @@ impl SlaveNote {
             link.noted.expect(&self.shown.came, 0, true);
         }
         let gone = match self.noted.was_tried() {
-            true => player.go(&self.own, &mut link, Some(self.switches)).0,
+            true => player.go(&self.scenario, &mut link, Some(self.switches)).0,
             false => match player
                 .learn(&mut link, false)
-                .and_then(|()| player.look(&self.own, &mut link))
+                .and_then(|()| player.look(&self.scenario, &mut link))
             {
                 Ok(()) => AttemptCourse::Skipped(Why::RunEnded.into()),
                 Err(error) => AttemptCourse::Unanswered(error),
@@ -403,7 +403,7 @@ impl Player {
     pub(super) fn note(
         &mut self,
         begun: Self,
-        scenario: &Arc<Own>,
+        scenario: &Arc<RigScenario>,
         link: &Observed<'_>,
         switches: bool,
         gone: &AttemptCourse,
@@ -411,7 +411,7 @@ impl Player {
         let exact = link.time_tolerance() == Span::ZERO;
         let shown = AttemptShown::of(gone, link, exact);
         self.notes.push(SlaveNote {
-            own: Arc::clone(scenario),
+            scenario: Arc::clone(scenario),
             begun,
             slaves: self.known.as_ref().unwrap_or(&self.partly).clone(),
             switches,

@@ -1,6 +1,6 @@
 //! Slaves made ready for a scenario: off, with the parameters of its header, and without a master.
 
-use super::{Own, Player};
+use super::{Player, RigScenario};
 use crate::rig::known::{INTERFACE, Known, PPO_TYPE};
 use crate::rig::observed::Observed;
 use crate::rig::talk::{Talk, TalkError};
@@ -32,7 +32,7 @@ impl Player {
     /// came meanwhile, which the memory of a slave holds since then (5.7): one of a time-out, where the computer stood still before.
     pub(super) fn prepare(
         &self,
-        scenario: &Own,
+        scenario: &RigScenario,
         link: &mut Observed<'_>,
         switches: bool,
     ) -> Result<bool, TalkError> {

@@ -1,7 +1,7 @@
 //! Scenarios played on a model of the slaves first: what a right slave with these parameters would not meet, and what the limits deny, is not
 //! begun.
 
-use super::{Own, Player};
+use super::{Player, RigScenario};
 use crate::language::syntax;
 use crate::rig::MASTER;
 use crate::rig::known::value_of;
@@ -85,7 +85,7 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    pub(super) fn rehearsed(&self, scenario: &Own) -> Result<PlayableScenario, Why> {
+    pub(super) fn rehearsed(&self, scenario: &RigScenario) -> Result<PlayableScenario, Why> {
         let other = self.other_port(scenario);
         let other = other.or_else(|| self.other_properties(scenario));
         if let Some(why) = other {
@@ -150,7 +150,7 @@ impl Player {
 
     /// Plays a scenario on the model with what was read of the slaves; where they had faults before, with other fault memories too: what these
     /// hold is not known, and a scenario that would show it is not met.
-    fn rehearse_all(&self, scenario: &Own, other: Other<'_>) -> Rehearsal {
+    fn rehearse_all(&self, scenario: &RigScenario, other: Other<'_>) -> Rehearsal {
         let mut played = self.rehearse(scenario, &self.limits, other);
         let had_faults = self
             .known()
@@ -166,7 +166,7 @@ impl Player {
     }
 
     /// What the slaves keep of the time before, where that alone keeps a scenario from being played.
-    fn keeps_too_much(&self, scenario: &Own, permitted: bool) -> Option<String> {
+    fn keeps_too_much(&self, scenario: &RigScenario, permitted: bool) -> Option<String> {
         let kept = self.known().iter().filter_map(|known| {
             let word = known
                 .history
@@ -219,7 +219,7 @@ impl Player {
     }
 
     /// What of the line and of the addresses and PPO types of its slaves is another than the scenario has, and is not switched.
-    fn other_port(&self, scenario: &Own) -> Option<String> {
+    fn other_port(&self, scenario: &RigScenario) -> Option<String> {
         let bench = &scenario.plan.setup;
         for slave in &bench.slaves {
             let address = slave.address;
@@ -245,7 +245,7 @@ impl Player {
                 ));
             }
         }
-        let other = scenario.scenario.header.rate.is_some() && bench.rate != self.rate;
+        let other = scenario.header.rate.is_some() && bench.rate != self.rate;
         other.then(|| {
             format!(
                 "the rig's line has {} kbit/s, that of the scenario {}",
@@ -256,8 +256,8 @@ impl Player {
     }
 
     /// The first property of the header of which a slave of the rig has another value, as far as is known.
-    fn other_properties(&self, scenario: &Own) -> Option<String> {
-        let lines = scenario.scenario.header.slaves.iter();
+    fn other_properties(&self, scenario: &RigScenario) -> Option<String> {
+        let lines = scenario.header.slaves.iter();
         let mut named = lines.filter_map(|line| match &line.what {
             syntax::SetupKind::Property(property, _) => Some(*property),
             _ => None,
@@ -275,7 +275,12 @@ impl Player {
         })
     }
 
-    pub(super) fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+    pub(super) fn rehearse(
+        &self,
+        scenario: &RigScenario,
+        limits: &Limits,
+        other: Other<'_>,
+    ) -> Rehearsal {
         let known = self.known().iter().enumerate();
         let slaves = known.map(|(place, known)| {
             let properties = other.properties.and_then(|all| all.get(place));

@@ -4,7 +4,7 @@
 //! shows it then as well. `run --rig` plays whole waits.
 
 use super::rehearse::Other;
-use super::{Own, Player};
+use super::{Player, RigScenario};
 use crate::rig::observed::Turn;
 use harness_bench::scenario::plan::PlannedAction;
 use harness_proto::time::Span;
@@ -22,8 +22,8 @@ const SLACK: Span = Span::from_millis(100);
 
 impl Player {
     /// The same scenario with waits that are as long as right slaves need for the same replies.
-    pub(super) fn shortened(&self, scenario: &Own, switches: bool) -> Own {
-        let played = |shorter: &Own| {
+    pub(super) fn shortened(&self, scenario: &RigScenario, switches: bool) -> RigScenario {
+        let played = |shorter: &RigScenario| {
             let other = Other {
                 switches,
                 ..Other::default()

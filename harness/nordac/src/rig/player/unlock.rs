@@ -1,6 +1,6 @@
 //! What in the rig's file would let a scenario be played that is skipped.
 
-use super::{Own, Player};
+use super::{Player, RigScenario};
 use crate::rig::known::{INTERFACE, Known};
 use crate::rig::{MASTER, RigSlave};
 use harness_bench::scenario::run::Unlock;
@@ -71,7 +71,7 @@ impl Setting {
 impl Player {
     /// What in the rig's file would together let a scenario be played, as far as the model shows it: with all of this it is played, with less of
     /// it is not. Nothing where no file would.
-    pub(super) fn unlocks(&self, scenario: &Own) -> BTreeSet<Unlock> {
+    pub(super) fn unlocks(&self, scenario: &RigScenario) -> BTreeSet<Unlock> {
         let Some((mut other, mut unlocks)) = self.at_another_port(scenario) else {
             return BTreeSet::new();
         };
@@ -95,18 +95,19 @@ impl Player {
     /// The same rig without limits, at a line with the rate of a scenario, and with its slaves; and what in `[port.1]` is changed for that.
     /// A slave of which nothing was read is as delivered, with the bus in control. `None` where no rig has
     /// such a slave, or where its parameters cannot be read.
-    fn at_another_port(&self, scenario: &Own) -> Option<(Self, BTreeSet<Unlock>)> {
+    fn at_another_port(&self, scenario: &RigScenario) -> Option<(Self, BTreeSet<Unlock>)> {
         let setup = &scenario.plan.setup;
         let mut other = Self::of(
             self.slaves.clone(),
             self.rate,
             self.patience,
             Limits::unlimited(),
-            (self.capabilities.clone(), self.restarts),
+            self.capabilities.clone(),
+            self.restarts,
         );
         other.beats = self.beats.clone();
         let mut unlocks = BTreeSet::new();
-        if scenario.scenario.header.rate.is_some() && setup.rate != self.rate {
+        if scenario.header.rate.is_some() && setup.rate != self.rate {
             other.rate = setup.rate;
             unlocks.insert(Unlock::Port(format!("`rate = {}`", setup.rate.name())));
         }

@@ -2,7 +2,7 @@
 //! one has left, and all is put back.
 
 use super::super::RigSlave;
-use super::super::player::{Own, Player};
+use super::super::player::{Player, RigScenario};
 use super::super::talk::Talk;
 use crate::gate::guarded;
 use crate::safe_state::{last_words, safe_state};
@@ -66,17 +66,17 @@ impl Desk {
         let gated: Vec<GuardedSlave> = slaves.iter().copied().map(Into::into).collect();
         let can = Bench::CAPABILITIES.iter();
         let can = can.copied().filter(|can| !NOT_ON_PORT.contains(can));
-        let can = (can.collect(), false);
+        let can = can.collect();
         Self {
             line: guarded(Bench::new(&setup), limits, &gated, false),
-            player: Player::of(slaves.clone(), RATE, PATIENCE, limits, can),
+            player: Player::of(slaves.clone(), RATE, PATIENCE, limits, can, false),
             slaves,
         }
     }
 
     /// Plays a scenario, takes the slaves to their safe state and puts them back. Returns what is left to say.
     fn play(&mut self, source: &Source) -> (Outcome, Vec<String>) {
-        let scenario = Arc::new(Own::read(source).expect("a scenario"));
+        let scenario = Arc::new(RigScenario::read(source).expect("a scenario"));
         if let Some(skip) = self.player.not_begun(&scenario) {
             return (Outcome::skipped(skip), Vec::new());
         }
@@ -135,7 +135,7 @@ fn a_slave_that_leaves_meanwhile_is_put_back() {
     for after in (0..24).step_by(3) {
         let mut desk = Desk::new(0, &[], Limits::unlimited());
         let before = desk.held();
-        let scenario = Arc::new(Own::read(&source(LOCAL)).expect("a scenario"));
+        let scenario = Arc::new(RigScenario::read(&source(LOCAL)).expect("a scenario"));
         let (outcome, _) = desk.player.attempt(&scenario, &mut desk.line);
         assert_eq!(outcome.verdict, Verdict::Passed);
         let at = desk.line.now() + Span::from_millis(after);
@@ -252,7 +252,7 @@ fn what_does_not_end_has_foretold_what_it_changes() {
         let text = format!(
             "title T\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 PKW={task}\nwait 5ms\n"
         );
-        let scenario = Own::read(&Source {
+        let scenario = RigScenario::read(&Source {
             name: "t.scn".to_owned(),
             text: text.into(),
         });

@@ -6,7 +6,7 @@
 
 use super::super::Axis;
 use super::super::observed::Exchange;
-use super::worlds::{AHEAD, LOST, MOST_LOST, Shown, TimedFrame};
+use super::worlds::{AHEAD, LOST, MOST_LOST, Proof, TimedFrame};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Dlc4;
@@ -135,10 +135,10 @@ pub(super) fn counted(
     came: &[TimedFrame],
     axis: Axis,
     tolerance: Span,
-) -> Option<Shown> {
+) -> Option<Proof> {
     let all = Conversation::of(talk, came, axis)?;
     let lossy = tolerance > Span::ZERO;
-    let mut shown = Shown::Right;
+    let mut shown = Proof::Right;
     for (register, cycle) in &all.cycles {
         let of_register = |came: &&TimedFrame| came.2.data().first() == Some(register);
         let frames = came.iter().filter(of_register).count() as u64;
@@ -146,7 +146,7 @@ pub(super) fn counted(
         let name = Register::of(*register).name;
         let node = axis.node;
         if frames > most {
-            return Some(Shown::Wrong(format!(
+            return Some(Proof::Wrong(format!(
                 "drive {node} sends register {register:02X} ({name}) {frames} times by its cycle of {} ms, and {most} times at most are right",
                 cycle.every
             )));
@@ -158,8 +158,8 @@ pub(super) fn counted(
                 cycle.every
             );
             shown = match lossy {
-                true => Shown::Lost(Some(*register), format!("{why}: {LOST}")),
-                false => return Some(Shown::Wrong(why)),
+                true => Proof::Lost(Some(*register), format!("{why}: {LOST}")),
+                false => return Some(Proof::Wrong(why)),
             };
         }
     }
@@ -192,7 +192,7 @@ mod tests {
     }
 
     /// Eight cycles of 50 ms for 600 ms, of which each register has sent this many; the reply after the requests was read this late.
-    fn judged(sends: impl Fn(usize) -> u64, late: u64, tolerance: u64) -> Option<Shown> {
+    fn judged(sends: impl Fn(usize) -> u64, late: u64, tolerance: u64) -> Option<Proof> {
         let request = |millis: u64, register: u8, every: u8| {
             (
                 at(millis),
@@ -222,17 +222,17 @@ mod tests {
     /// App 8: the table has eight places. A frame or two may be lost by an adapter.
     #[test]
     fn a_register_without_a_place_is_missed() {
-        assert_eq!(judged(|_| 12, 0, 0), Some(Shown::Right));
-        assert_eq!(judged(|_| 10, 0, 20), Some(Shown::Right));
+        assert_eq!(judged(|_| 12, 0, 0), Some(Proof::Right));
+        assert_eq!(judged(|_| 10, 0, 20), Some(Proof::Right));
         let six = |place: usize| if place < 6 { 12 } else { 0 };
-        assert!(matches!(judged(six, 0, 0), Some(Shown::Wrong(_))));
+        assert!(matches!(judged(six, 0, 0), Some(Proof::Wrong(_))));
         assert!(matches!(
             judged(six, 0, 20),
-            Some(Shown::Lost(Some(0x79), _))
+            Some(Proof::Lost(Some(0x79), _))
         ));
-        assert!(matches!(judged(|_| 24, 0, 20), Some(Shown::Wrong(_))));
+        assert!(matches!(judged(|_| 24, 0, 20), Some(Proof::Wrong(_))));
         // It may have begun only when the reply after its request came.
-        assert_eq!(judged(six, 590, 20), Some(Shown::Right));
+        assert_eq!(judged(six, 590, 20), Some(Proof::Right));
     }
 
     /// Fewer cycles at once are followed.

@@ -7,17 +7,17 @@
 
 mod counted;
 mod note;
-mod own;
 #[cfg(test)]
 mod own_tests;
 mod ready;
+mod rig_scenario;
 mod verdict;
 mod worlds;
 
 pub(crate) use note::DriveNote;
-pub(super) use own::{Own, stores};
+pub(super) use rig_scenario::{RigScenario, stores};
 use verdict::{are_judged, explained, unlike};
-use worlds::{BESIDE_THE_BUS, STANDSTILL, Shown, Told};
+use worlds::{AttemptFrames, BESIDE_THE_BUS, Proof, STANDSTILL};
 
 use super::Axis;
 use super::known::Known;
@@ -27,9 +27,8 @@ use super::set_back::foretell;
 use crate::driver::Error;
 use crate::gate::GuardsSegment as _;
 use crate::gate::guarded;
-use crate::language::Unitek;
 use crate::language::plan::{node, octet_time};
-use crate::language::syntax::{PropertyValue, SetupKind};
+use crate::language::syntax::{Header, PropertyValue, SetupKind};
 use crate::simulate::{self, Bench};
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use harness_bench::medium::Medium;
@@ -38,7 +37,6 @@ use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::playing::observed::{Beats, LinkTimes};
 use harness_bench::scenario::expression::Scope;
 use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
-use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::limit::LimitSetting;
@@ -218,7 +216,7 @@ impl Player {
     }
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
-    pub(super) fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+    pub(super) fn not_begun(&self, scenario: &RigScenario) -> Option<Skip> {
         let bench = &scenario.plan.setup;
         let axis = |node: u8| self.axes.iter().find(|axis| axis.node == node);
         for drive in &bench.drives {
@@ -233,7 +231,7 @@ impl Player {
             };
             return Some(Why::OtherDrives(why).into());
         }
-        let stated = scenario.scenario.header.rate.is_some();
+        let stated = scenario.header.rate.is_some();
         if stated && bench.rate != self.rate {
             let why = format!(
                 "the rig's bus has {} kbit/s, that of the scenario {}",
@@ -267,7 +265,7 @@ impl Player {
     /// before the scenario, in words.
     pub(super) fn attempt(
         &mut self,
-        scenario: &Arc<Own>,
+        scenario: &Arc<RigScenario>,
         link: &mut dyn Link,
     ) -> (Outcome, String) {
         link.begin();
@@ -299,7 +297,7 @@ impl Player {
                 let (asked, mut explained_so): (Vec<_>, Vec<_>) =
                     unlike.iter().partition(|differs| asks.contains(&differs.1));
                 explained_so.extend(explained(&asked, &drives));
-                let told = Told {
+                let told = AttemptFrames {
                     talk: std::mem::take(&mut link.noted.exchange),
                     way,
                     explained: explained_so,
@@ -308,18 +306,18 @@ impl Player {
                 };
                 let exact = way.tolerance == Span::ZERO;
                 let shown = match scenario.acts_beside_the_bus() {
-                    true => Shown::Unknown(BESIDE_THE_BUS),
+                    true => Proof::Unknown(BESIDE_THE_BUS),
                     false => self.shown(&told),
                 };
                 let failed = outcome.verdict == Verdict::Failed;
                 let shown = match shown {
-                    Shown::Unknown(BESIDE_THE_BUS) if exact => self.replayed(scenario, &told),
-                    Shown::Unknown(_) if exact && failed && scenario.is_foretold() => {
+                    Proof::Unknown(BESIDE_THE_BUS) if exact => self.replayed(scenario, &told),
+                    Proof::Unknown(_) if exact && failed && scenario.is_foretold() => {
                         self.replayed(scenario, &told)
                     }
                     shown => self.lost_again(scenario, shown),
                 };
-                let wrong = matches!(shown, Shown::Wrong(_));
+                let wrong = matches!(shown, Proof::Wrong(_));
                 let outcome = self.judged(scenario, *outcome, (&told.unlike, &foretold, shown));
                 if let Some(note) = self.notes.last_mut() {
                     note.told(told, wrong);
@@ -338,7 +336,12 @@ impl Player {
     }
 
     /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
-    fn go(&mut self, scenario: &Own, link: &mut Observed<'_>, rehearses: bool) -> AttemptCourse {
+    fn go(
+        &mut self,
+        scenario: &RigScenario,
+        link: &mut Observed<'_>,
+        rehearses: bool,
+    ) -> AttemptCourse {
         self.before = None;
         self.levels.clear();
         if let Err(error) = self.learn(link) {
@@ -420,8 +423,8 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    fn rehearsed(&self, scenario: &Own, real: bool) -> Result<Rehearsal, Skip> {
-        if let Some(why) = self.other_properties(&scenario.scenario) {
+    fn rehearsed(&self, scenario: &RigScenario, real: bool) -> Result<Rehearsal, Skip> {
+        if let Some(why) = self.other_properties(&scenario.header) {
             return Err(Why::OtherDrives(why).into());
         }
         let first = self.rehearse(scenario, &self.limits, Other::default());
@@ -487,8 +490,8 @@ impl Player {
     }
 
     /// The first property of the header that the rig's drives have another value of, or that is not settled.
-    fn other_properties(&self, scenario: &Scenario<Unitek>) -> Option<String> {
-        scenario.header.drives.iter().find_map(|line| {
+    fn other_properties(&self, header: &Header) -> Option<String> {
+        header.drives.iter().find_map(|line| {
             let node = node(&line.drive, Scope::default()).ok()?;
             let known = self.known().iter().find(|known| known.axis.node == node)?;
             let mut wanted = known.properties;
@@ -526,7 +529,7 @@ impl Player {
         })
     }
 
-    fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other) -> Rehearsal {
+    fn rehearse(&self, scenario: &RigScenario, limits: &Limits, other: Other) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
@@ -594,7 +597,6 @@ fn differs_between_profiles(property: &harness_proto::unitek::properties::Descri
     values.windows(2).any(|pair| pair[0] != pair[1])
 }
 
-/// Permits what a setting denies.
 const fn permit(limits: &mut Limits, setting: LimitSetting) {
     match setting {
         LimitSetting::Motion => limits.motion = true,

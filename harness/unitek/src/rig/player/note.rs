@@ -5,8 +5,8 @@
 
 use super::super::known::Known;
 use super::super::observed::Observed;
-use super::worlds::Told;
-use super::{AttemptCourse, Own, Player};
+use super::worlds::AttemptFrames;
+use super::{AttemptCourse, Player, RigScenario};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
 use crate::gate::guarded;
@@ -41,14 +41,14 @@ pub(crate) enum Other {
 
 #[derive(Clone, Debug)]
 pub(crate) struct DriveNote {
-    own: Arc<Own>,
+    scenario: Arc<RigScenario>,
     /// What was known when it began.
     begun: Player,
     /// What was known of the drives in it.
     drives: Vec<Known>,
     shown: AttemptShown,
     /// Its frames and their times, where time is real or they alone judge.
-    told: Option<Told>,
+    told: Option<AttemptFrames>,
     /// Whether no right drive could have sent them then.
     wrong: bool,
     noted: Noted,
@@ -129,9 +129,9 @@ impl DriveNote {
     }
 
     /// Notes its frames and their times, and whether no right drive could have sent them.
-    pub(super) fn told(&mut self, told: Told, wrong: bool) {
+    pub(super) fn told(&mut self, told: AttemptFrames, wrong: bool) {
         self.wrong = wrong;
-        self.told = Some(told).filter(|_| !self.noted.exact || self.own.by_frames);
+        self.told = Some(told).filter(|_| !self.noted.exact || self.scenario.by_frames);
     }
 
     /// Whether the frames and their times are those that a drive with a deviation could have sent; `None` where that is not compared.
@@ -252,7 +252,7 @@ impl DriveNote {
         let mut link = Observed::new(&mut recording);
         link.noted.keep();
         let gone = match self.noted.was_tried() {
-            true => player.go(&self.own, &mut link, false),
+            true => player.go(&self.scenario, &mut link, false),
             false => match player.learn(&mut link) {
                 Ok(()) => AttemptCourse::Skipped(Why::RunEnded.into()),
                 Err(error) => AttemptCourse::Unanswered(error),
@@ -376,7 +376,7 @@ impl Player {
     pub(super) fn note(
         &mut self,
         begun: Self,
-        scenario: &Arc<Own>,
+        scenario: &Arc<RigScenario>,
         link: &Observed<'_>,
         gone: &AttemptCourse,
     ) {
@@ -390,7 +390,7 @@ impl Player {
         let exact = link.time_tolerance() == Span::ZERO;
         let shown = AttemptShown::of(gone, link, exact);
         let note = DriveNote {
-            own: Arc::clone(scenario),
+            scenario: Arc::clone(scenario),
             begun,
             drives: drives.collect(),
             told: None,

@@ -1,7 +1,7 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
-use super::worlds::{Shown, Told};
-use super::{Known, Own, Player};
+use super::worlds::{AttemptFrames, Proof};
+use super::{Known, Player, RigScenario};
 use crate::BUSES;
 use crate::rig::Axis;
 use crate::rig::observed::Exchange;
@@ -87,8 +87,8 @@ fn by_frames() -> Vec<(String, Source)> {
     };
     let all = conversations(&[axis], &Limits::unlimited()).into_iter();
     let kept = all.filter(|source| !source.name.contains(WALK));
-    let own = kept.filter(|source| Own::read(source).expect("a conversation").by_frames);
-    let named = own.map(|source| {
+    let ours = kept.filter(|source| RigScenario::read(source).expect("a conversation").by_frames);
+    let named = ours.map(|source| {
         let name = source.name.strip_prefix(CONVERSATION);
         (name.unwrap_or_default().to_owned(), source)
     });
@@ -98,15 +98,15 @@ fn by_frames() -> Vec<(String, Source)> {
 #[test]
 fn wrong_drives_fail_and_right_ones_pass() {
     let all = by_frames();
-    let names: BTreeSet<&str> = all.iter().map(|own| own.0.as_str()).collect();
-    assert_eq!(names, WRONG.iter().map(|own| own.0).collect());
+    let names: BTreeSet<&str> = all.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, WRONG.iter().map(|row| row.0).collect());
     for (name, source) in &all {
         assert_eq!(
             outcome(&mut bench(&[]), source).verdict,
             Verdict::Passed,
             "{name}"
         );
-        let wrong = WRONG.iter().filter(|own| own.0 == name);
+        let wrong = WRONG.iter().filter(|deviation| deviation.0 == name);
         for (_, deviation) in wrong {
             let line = format!("drive 1 deviates {deviation}");
             let outcome = outcome(&mut bench(&[&line]), source);
@@ -173,15 +173,15 @@ fn scenarios_are_for_drives_of_any_firmware() {
 fn drives_with_other_registers_are_qualified_with_the_scenarios_of_the_dump() {
     let rig = parse(&desk(&["drive 1 register D9 = 0200"]), &BUSES).expect("a rig's file");
     let source = kept("unitek-app-5-torque");
-    let own = Own::read(&source).expect("a scenario");
+    let scenario = RigScenario::read(&source).expect("a scenario");
     let rehearsed = |qualifies, real| {
         let mut player = Player::new(&rig, true, qualifies);
         let mut known = Known::new(player.axes[0]);
-        let dump = REGISTERS.iter().map(|own| (own.number, own.dump));
+        let dump = REGISTERS.iter().map(|row| (row.number, row.dump));
         known.cells = dump.collect();
         known.cells.insert(0xD9, 0x0200);
         player.known = Some(vec![known]);
-        player.rehearsed(&own, real).is_ok()
+        player.rehearsed(&scenario, real).is_ok()
     };
     assert!(rehearsed(true, true));
     assert!(!rehearsed(true, false) && !rehearsed(false, true));
@@ -209,8 +209,9 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
             name: "t".to_owned(),
             text: text.into(),
         };
-        let own = Own::read(&source).expect("a scenario");
-        let unmet: Vec<_> = own.plan.steps.iter().map(|own| own.span.start).collect();
+        let scenario = RigScenario::read(&source).expect("a scenario");
+        let steps = scenario.plan.steps.iter();
+        let unmet: Vec<_> = steps.map(|step| step.span.start).collect();
         let known = if foretold { &unmet[..] } else { &[] };
         let outcome = Outcome {
             verdict: Verdict::Failed,
@@ -218,8 +219,8 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
             ..Outcome::rig_error(String::new())
         };
         let judged = |unlike: &[(u8, u8)]| {
-            let shown = (unlike, known, Shown::Complete);
-            player.judged(&own, outcome.clone(), shown).verdict
+            let shown = (unlike, known, Proof::Complete);
+            player.judged(&scenario, outcome.clone(), shown).verdict
         };
         assert_eq!(judged(&[]), verdict, "{lines}");
         // What a drive reads differently at rest is not compared.
@@ -250,20 +251,20 @@ fn what_is_lost_each_time_accuses() {
     let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
     let mut player = Player::new(&rig, true, true);
     let (_, source) = by_frames().swap_remove(0);
-    let own = Own::read(&source).expect("a conversation");
-    let lost = |register| Shown::Lost(Some(register), "it has not come".to_owned());
-    let wrong = Shown::Wrong("it has not come".to_owned());
+    let scenario = RigScenario::read(&source).expect("a conversation");
+    let lost = |register| Proof::Lost(Some(register), "it has not come".to_owned());
+    let wrong = Proof::Wrong("it has not come".to_owned());
     for (shown, expected) in [
         (lost(0x30), lost(0x30)),
         (lost(0x30), lost(0x30)),
         (lost(0x31), lost(0x31)),
         (lost(0x31), lost(0x31)),
-        (Shown::Complete, Shown::Complete),
+        (Proof::Complete, Proof::Complete),
         (lost(0x31), lost(0x31)),
         (lost(0x31), lost(0x31)),
         (lost(0x31), wrong),
     ] {
-        assert_eq!(player.lost_again(&own, shown), expected);
+        assert_eq!(player.lost_again(&scenario, shown), expected);
     }
 }
 
@@ -285,7 +286,7 @@ fn what_comes_after_a_standstill_accuses_no_drive_at_once() {
         talk.came = came.to_vec();
         talk.read = at(45 + gap);
         talk.came[3].2 = frame("181#1BD90100");
-        player.shown(&Told {
+        player.shown(&AttemptFrames {
             talk,
             way: LinkTimes {
                 late: Span::ZERO,
@@ -297,9 +298,9 @@ fn what_comes_after_a_standstill_accuses_no_drive_at_once() {
             follows: false,
         })
     };
-    assert!(matches!(shown(10), Shown::Wrong(_)), "{:?}", shown(10));
-    assert!(matches!(shown(100), Shown::Lost(..)), "{:?}", shown(100));
-    assert!(matches!(shown(300), Shown::Unknown(_)), "{:?}", shown(300));
+    assert!(matches!(shown(10), Proof::Wrong(_)), "{:?}", shown(10));
+    assert!(matches!(shown(100), Proof::Lost(..)), "{:?}", shown(100));
+    assert!(matches!(shown(300), Proof::Unknown(_)), "{:?}", shown(300));
 }
 
 /// A walk alone finds wrong drives that no line of it describes; a right one passes.
@@ -310,12 +311,12 @@ fn a_walk_finds_wrong_drives() {
     let walks: Vec<_> = all.filter(|source| source.name.contains(WALK)).collect();
     let verdicts = |setup: &[&str]| {
         let mut bench = bench(setup);
-        let verdicts = walks.iter().map(|own| outcome(&mut bench, own).verdict);
+        let verdicts = walks.iter().map(|walk| outcome(&mut bench, walk).verdict);
         verdicts.collect::<Vec<_>>()
     };
     let right = verdicts(&[]);
     assert!(
-        right.len() > 3 && right.iter().all(|own| *own == Verdict::Passed),
+        right.len() > 3 && right.iter().all(|verdict| *verdict == Verdict::Passed),
         "{right:?}"
     );
     for wrong in [

@@ -5,7 +5,7 @@ use super::super::observed::Observed;
 use super::super::probe;
 use super::super::qualify::free;
 use super::super::set_back::foretell;
-use super::{AT_REST, AtRest, Own, Player};
+use super::{AT_REST, AtRest, Player, RigScenario};
 use crate::driver::{Driver, Error};
 use harness_bench::link::Link;
 use harness_bench::scenario::run::Outcome;
@@ -102,7 +102,7 @@ impl Player {
     /// Makes the drives ready: locked, without commands, with the registers of the header, and released where motors may turn.
     pub(super) fn prepare(
         &self,
-        scenario: &Own,
+        scenario: &RigScenario,
         release: bool,
         link: &mut dyn Link,
     ) -> Result<AtRest, Error> {

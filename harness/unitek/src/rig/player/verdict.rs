@@ -1,8 +1,8 @@
 //! The verdict of an attempt in which a line was not met, or right drives would have sent something else.
 
 use super::note::{meaning, phases};
-use super::worlds::{BESIDE_THE_BUS, STOOD_STILL, Shown, Told};
-use super::{AtRest, Other, Own, Player};
+use super::worlds::{AttemptFrames, BESIDE_THE_BUS, Proof, STOOD_STILL};
+use super::{AtRest, Other, Player, RigScenario};
 use crate::judge::World;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
@@ -30,26 +30,26 @@ const UNDER_WAY: &str = "right drives could have sent this with another value of
 
 impl Player {
     /// What was shown, where it is compared with the attempts before: a drive that does not send something does not send it each time.
-    pub(super) fn lost_again(&mut self, scenario: &Own, shown: Shown) -> Shown {
+    pub(super) fn lost_again(&mut self, scenario: &RigScenario, shown: Proof) -> Proof {
         let before = self.lost.remove(&scenario.name);
-        let Shown::Lost(register, why) = shown else {
+        let Proof::Lost(register, why) = shown else {
             return shown;
         };
         let same = before.filter(|lost| lost.0 == register);
         let times = same.map_or(1, |lost| lost.1 + 1);
         if times > LOST_BY_THE_ADAPTER {
-            return Shown::Wrong(why);
+            return Proof::Wrong(why);
         }
         self.lost.insert(scenario.name.clone(), (register, times));
-        Shown::Lost(register, why)
+        Proof::Lost(register, why)
     }
 
     /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met.
     pub(super) fn judged(
         &self,
-        scenario: &Own,
+        scenario: &RigScenario,
         outcome: Outcome,
-        (unlike, foretold, shown): (&[(u8, u8)], &[usize], Shown),
+        (unlike, foretold, shown): (&[(u8, u8)], &[usize], Proof),
     ) -> Outcome {
         let differs = |register| unlike.iter().any(|differs| differs.1 == register);
         let judged = |line: &usize| {
@@ -60,21 +60,21 @@ impl Player {
         };
         let judged_by_worlds = !outcome.unmet.is_empty() && outcome.unmet.iter().all(judged);
         match (outcome.verdict, shown) {
-            (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => {
+            (Verdict::Failed | Verdict::Passed, Proof::Wrong(why)) => {
                 wronged(scenario, outcome, why)
             }
-            (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
+            (Verdict::Failed | Verdict::Passed, Proof::Lost(_, why)) => Outcome {
                 verdict: Verdict::Inconclusive,
                 shows_nothing: true,
                 remarks: std::iter::once(why).chain(outcome.remarks).collect(),
                 ..outcome
             },
-            (Verdict::Failed, Shown::Complete) if judged_by_worlds => right_all_the_same(outcome),
-            (Verdict::Failed, Shown::Complete) => inconclusive(outcome, NOT_COMPARED.to_owned()),
-            (Verdict::Passed, Shown::Complete) => outcome.judged_by(&scenario.plan),
-            (Verdict::Failed, Shown::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
-            (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
-            (Verdict::Passed, Shown::Unknown(why)) if scenario.by_frames || why == STOOD_STILL => {
+            (Verdict::Failed, Proof::Complete) if judged_by_worlds => right_all_the_same(outcome),
+            (Verdict::Failed, Proof::Complete) => inconclusive(outcome, NOT_COMPARED.to_owned()),
+            (Verdict::Passed, Proof::Complete) => outcome.judged_by(&scenario.plan),
+            (Verdict::Failed, Proof::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
+            (Verdict::Failed, Proof::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
+            (Verdict::Passed, Proof::Unknown(why)) if scenario.by_frames || why == STOOD_STILL => {
                 inconclusive(outcome, not_to_its_end(why))
             }
             _ => outcome.judged_by(&scenario.plan),
@@ -83,7 +83,7 @@ impl Player {
 
     /// What right drives show in virtual time where their frames alone do not tell it, as where faults are put on frames: the attempt is played
     /// on each of them, wherever its clock stands and whatever the manual leaves open. The lines alone compare times.
-    pub(super) fn replayed(&self, scenario: &Own, told: &Told) -> Shown {
+    pub(super) fn replayed(&self, scenario: &RigScenario, told: &AttemptFrames) -> Proof {
         let came = told.talk.came_since_it_began();
         let came: Vec<_> = came.map(|frame| meaning(frame, true)).collect();
         let could_send = |other: &Other| {
@@ -104,15 +104,15 @@ impl Player {
             })
         });
         match phases.chain(values).any(|other| could_send(&other)) {
-            true => Shown::Right,
-            false if told.unlike.is_empty() => Shown::Wrong(NOT_REPLAYED.to_owned()),
-            false => Shown::Unknown(BESIDE_THE_BUS),
+            true => Proof::Right,
+            false if told.unlike.is_empty() => Proof::Wrong(NOT_REPLAYED.to_owned()),
+            false => Proof::Unknown(BESIDE_THE_BUS),
         }
     }
 }
 
 /// An attempt in which a drive did what no right one does, in a sentence.
-fn wronged(scenario: &Own, outcome: Outcome, wrong: String) -> Outcome {
+fn wronged(scenario: &RigScenario, outcome: Outcome, wrong: String) -> Outcome {
     let last = scenario.plan.steps.last();
     let found = outcome.finding.unwrap_or_else(|| Mismatch {
         span: last.map_or(TextSpan::default(), |step| step.span),
@@ -129,7 +129,7 @@ fn wronged(scenario: &Own, outcome: Outcome, wrong: String) -> Outcome {
 }
 
 /// Whether right drives are compared in what the lines ask for that the model has not met.
-pub(super) fn are_judged(scenario: &Own, rehearsed: &Outcome) -> bool {
+pub(super) fn are_judged(scenario: &RigScenario, rehearsed: &Outcome) -> bool {
     let mut asked = scenario.asks_at(&rehearsed.unmet).into_iter();
     !rehearsed.unmet.is_empty() && asked.all(World::compares_partly)
 }

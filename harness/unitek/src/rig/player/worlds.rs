@@ -57,18 +57,17 @@ pub(super) type TimedFrame = (Instant, Instant, Frame);
 
 /// The frames of an attempt, and what is known of their times.
 #[derive(Clone, Debug)]
-pub(super) struct Told {
+pub(super) struct AttemptFrames {
     pub(super) talk: Exchange,
     pub(super) way: LinkTimes,
     /// Registers that read something else at rest than those of the model, by drive.
     pub(super) unlike: Vec<(u8, u8)>,
     /// Those of them which a right drive may read so.
     pub(super) explained: Vec<(u8, u8)>,
-    /// Whether moves to positions are followed.
     pub(super) follows: bool,
 }
 
-impl Told {
+impl AttemptFrames {
     fn measured(&self) -> Span {
         self.way.late.max(self.way.longest)
     }
@@ -94,7 +93,6 @@ impl Told {
         }
     }
 
-    /// How late a frame may be at most.
     fn slowest(&self) -> Span {
         match self.way.tolerance {
             Span::ZERO => Span::ZERO,
@@ -105,7 +103,7 @@ impl Told {
 
 /// What right drives say of an attempt.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum Proof {
     /// Something no right drive would have sent, in a sentence.
     Wrong(String),
     /// An adapter may have lost frames of a register, or something has stood still: where it comes again and again, no right drive has sent it.
@@ -132,7 +130,7 @@ pub(super) const BESIDE_THE_BUS: &str =
 const TOO_MANY: &str = "it has more worlds than are kept";
 pub(super) const STOOD_STILL: &str = "nothing came for a quarter of a second or more: an adapter, the computer or the drive stood still";
 
-impl Shown {
+impl Proof {
     /// What several drives come to.
     fn and(self, other: Self) -> Self {
         match (self, other) {
@@ -147,24 +145,24 @@ impl Shown {
 
 impl Player {
     /// Whether right drives could have sent what came.
-    pub(super) fn shown(&self, told: &Told) -> Shown {
+    pub(super) fn shown(&self, told: &AttemptFrames) -> Proof {
         let each = self.known().iter().map(|known| self.shown_by(known, told));
-        let shown = each.reduce(Shown::and);
-        match shown.unwrap_or(Shown::Unknown(NOT_AT_REST)) {
-            Shown::Wrong(_) if told.stood_still() => Shown::Unknown(STOOD_STILL),
-            Shown::Wrong(why) if told.may_have_stood_still() => {
-                Shown::Lost(None, format!("{why}: {HELD_UP}"))
+        let shown = each.reduce(Proof::and);
+        match shown.unwrap_or(Proof::Unknown(NOT_AT_REST)) {
+            Proof::Wrong(_) if told.stood_still() => Proof::Unknown(STOOD_STILL),
+            Proof::Wrong(why) if told.may_have_stood_still() => {
+                Proof::Lost(None, format!("{why}: {HELD_UP}"))
             }
             shown => shown,
         }
     }
 
-    fn shown_by(&self, known: &Known, told: &Told) -> Shown {
+    fn shown_by(&self, known: &Known, told: &AttemptFrames) -> Proof {
         let unlike = self.unlike(known, told);
         let talk = &told.talk;
         let (came, changed) = match self.came_from(known, talk) {
             Ok(came) => came,
-            Err(why) => return Shown::Unknown(why),
+            Err(why) => return Proof::Unknown(why),
         };
         if let Some(shown) = counted(talk, &came, known.axis, told.way.tolerance) {
             return shown;
@@ -185,10 +183,10 @@ impl Player {
         };
         for (late, overtakes) in told.lateness() {
             match judged(known.properties, late, (overtakes, true), 0) {
-                Judged::Right if changed => return Shown::Unknown(CHANGED_INPUTS),
-                Judged::Right => return Shown::Complete,
-                Judged::TooMany => return Shown::Unknown(TOO_MANY),
-                Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
+                Judged::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
+                Judged::Right => return Proof::Complete,
+                Judged::TooMany => return Proof::Unknown(TOO_MANY),
+                Judged::Unknown => return Proof::Unknown(NOT_FORETOLD),
                 Judged::Wrong(..) => {}
             }
         }
@@ -202,15 +200,15 @@ impl Player {
         let mut wrong = None;
         for properties in std::iter::once(known.properties).chain(others) {
             match judged(properties, told.slowest(), (true, false), 0) {
-                Judged::Right if changed => return Shown::Unknown(CHANGED_INPUTS),
-                Judged::Right => return Shown::Right,
-                Judged::TooMany => return Shown::Unknown(TOO_MANY),
-                Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
+                Judged::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
+                Judged::Right => return Proof::Right,
+                Judged::TooMany => return Proof::Unknown(TOO_MANY),
+                Judged::Unknown => return Proof::Unknown(NOT_FORETOLD),
                 Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
             }
         }
         let Some((place, expected)) = wrong else {
-            return Shown::Unknown(NOT_FORETOLD);
+            return Proof::Unknown(NOT_FORETOLD);
         };
         let mut unclear = false;
         let mut loses = || {
@@ -226,12 +224,12 @@ impl Player {
         let why = words(known, &came, place, expected);
         let asked = expected.and_then(|frame| frame.data().first().copied());
         match register {
-            Some(_) => Shown::Lost(register, format!("{why}: {LOST}")),
+            Some(_) => Proof::Lost(register, format!("{why}: {LOST}")),
             // The drives were made ready, and what the scenario sends has too many worlds after a loss.
             None if unclear && asked.is_some_and(|first| talk.asks_before_it_began(first)) => {
-                Shown::Unknown(TOO_MANY)
+                Proof::Unknown(TOO_MANY)
             }
-            None => Shown::Wrong(why),
+            None => Proof::Wrong(why),
         }
     }
 
@@ -243,7 +241,7 @@ impl Player {
         known: &Known,
         setup: &DriveSetup,
         more: u8,
-        shown: &Told,
+        shown: &AttemptFrames,
         wrong: bool,
     ) -> Option<bool> {
         self.beats.beat();
@@ -293,7 +291,7 @@ impl Player {
 
     /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model,
     /// which a right drive may.
-    fn unlike(&self, known: &Known, told: &Told) -> Arc<BTreeSet<u8>> {
+    fn unlike(&self, known: &Known, told: &AttemptFrames) -> Arc<BTreeSet<u8>> {
         let explained = told.explained.iter();
         let explained = explained.filter(|(node, _)| *node == known.axis.node);
         let model = known.model(known.properties);
@@ -317,7 +315,7 @@ impl Player {
         known: &Known,
         properties: Properties,
         unlike: &Arc<BTreeSet<u8>>,
-        told: &Told,
+        told: &AttemptFrames,
     ) -> World {
         let drive = known.model(properties).drive(self.rate, Instant::START);
         // The conversations whose moves are followed ask for nothing while homing may end.
@@ -382,7 +380,7 @@ fn says_by_itself(talk: &Exchange) -> bool {
 }
 
 /// A drive whose moves to positions are followed, where they are.
-fn follows(world: World, told: &Told) -> World {
+fn follows(world: World, told: &AttemptFrames) -> World {
     match told.follows {
         true => world.following(),
         false => world,
@@ -459,7 +457,7 @@ fn said(mut drive: World, talk: &Exchange, late: Span) -> Vec<(Instant, Frame)> 
 }
 
 /// Whether two drives say the same in a conversation, with frames as late as they may be and without.
-fn say_the_same(one: &World, other: &World, told: &Told) -> bool {
+fn say_the_same(one: &World, other: &World, told: &AttemptFrames) -> bool {
     let mut late = [Span::ZERO, told.slowest()].into_iter();
     late.all(|late| {
         let [one, other] = [one, other].map(|world| said(world.clone(), &told.talk, late));

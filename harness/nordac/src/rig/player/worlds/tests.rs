@@ -1,7 +1,7 @@
 //! Right inverters over every way to a bench, and wrong ones.
 
 use super::super::rehearse::Other;
-use super::super::{Own, Player};
+use super::super::{Player, RigScenario};
 use super::*;
 use crate::rig::RigSlave;
 use harness_bench::scenario::source::Source;
@@ -48,11 +48,11 @@ fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
         name: "x".to_owned(),
         text: text.into(),
     };
-    let scenario = Own::read(&source).expect("a scenario");
+    let scenario = RigScenario::read(&source).expect("a scenario");
     let limits = Limits::unlimited();
     let patience = Span::from_millis(5);
-    let able = (Vec::new(), false);
-    let mut player = Player::of(vec![slave.slave], BusRate::K500, patience, limits, able);
+    let (slaves, rate) = (vec![slave.slave], BusRate::K500);
+    let mut player = Player::of(slaves, rate, patience, limits, Vec::new(), false);
     player.known = Some(vec![slave.clone()]);
     player.rehearse(&scenario, &limits, Other::default()).turns
 }

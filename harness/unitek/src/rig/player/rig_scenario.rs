@@ -3,6 +3,7 @@
 use super::{AT_REST, Known};
 use crate::language::Unitek;
 use crate::language::plan::{Act, WantedFrame, WantedOutcome};
+use crate::language::syntax::Header;
 use crate::rig::Axis;
 use crate::simulate::DriveSetup;
 use harness_bench::qualify::segment::CONVERSATION;
@@ -27,17 +28,17 @@ const HOMING: u8 = 0x78;
 /// The firmware, which each drive has of its own (dump).
 const FIRMWARE: u8 = 0x1B;
 
-/// A scenario of this bus.
+/// A scenario, read for a rig.
 #[derive(Clone, Debug)]
-pub(crate) struct Own {
+pub(crate) struct RigScenario {
     pub(super) name: String,
-    pub(super) scenario: Scenario<Unitek>,
+    pub(super) header: Header,
     pub(in super::super) plan: Plan<Unitek>,
     /// Whether no line waits for a frame: what comes is judged by right drives alone.
     pub(super) by_frames: bool,
 }
 
-impl Own {
+impl RigScenario {
     pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Unitek> = parse(source)?;
         let mut plan = plan(&scenario, source, None)?;
@@ -51,7 +52,7 @@ impl Own {
         plan.strict &= !by_frames;
         Ok(Self {
             name: source.name.clone(),
-            scenario,
+            header: scenario.header,
             plan,
             by_frames,
         })
