@@ -91,10 +91,7 @@ pub(crate) fn bench(
         .unwrap_or(usual)
         .iter()
         .map(|address| format!("slave {address}\nslave {address} parameter 1621 = 2\n"));
-    let setup = Source {
-        name: "setup".to_owned(),
-        text: lines.collect::<String>().into(),
-    };
+    let setup = Source::new("setup", lines.collect::<String>());
     let mut scenario: Scenario<Nordac> = read(&setup, Part::Header)?;
     if let Some(header) = header {
         let more: Scenario<Nordac> = read(header, Part::Header)?;

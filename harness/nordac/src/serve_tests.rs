@@ -187,10 +187,10 @@ fn a_page_counts_tokens_of_a_lone_master() {
 #[test]
 fn slaves_of_header_and_command_line() {
     use harness_bench::scenario::source::Source;
-    let header = Source {
-        name: "setup".to_owned(),
-        text: "slave 9 ppo 2\nslave 20 parameter 1621 = 3\nrate 1500\n".into(),
-    };
+    let header = Source::new(
+        "setup",
+        "slave 9 ppo 2\nslave 20 parameter 1621 = 3\nrate 1500\n",
+    );
     let addresses = |plan: &harness_bench::scenario::plan::Plan<super::language::Nordac>| {
         let slaves = plan.setup.slaves.iter();
         slaves.map(|slave| slave.address).collect::<Vec<_>>()

@@ -40,10 +40,7 @@ pub(crate) fn serve(
 /// # Errors
 /// The header has mistakes. Steps after it are ignored.
 pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<Unitek>, Problems> {
-    let empty = Source {
-        name: "setup".to_owned(),
-        text: "".into(),
-    };
+    let empty = Source::new("setup", "");
     let header = header.unwrap_or(&empty);
     let mut scenario: Scenario<Unitek> = read(header, Part::Header)?;
     scenario.steps.clear();

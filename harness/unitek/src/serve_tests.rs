@@ -362,10 +362,7 @@ fn lines_of_control_act_on_drives() {
 /// A header describes the drives; those that `--drives` asks for are added.
 #[test]
 fn a_header_describes_the_drives() {
-    let source = |text: &str| Source {
-        name: "desk.scn".to_owned(),
-        text: text.into(),
-    };
+    let source = |text: &str| Source::new("desk.scn", text);
     let nodes = |drives, text: &str| {
         let plan = bench(drives, Some(&source(text))).expect("a header");
         let drives = plan.setup.drives.iter();

@@ -57,6 +57,14 @@ pub fn line_number(text: &str, at: usize) -> usize {
 }
 
 impl Source {
+    /// A text that no file has.
+    pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
+        Self {
+            name: name.into(),
+            text: text.into(),
+        }
+    }
+
     /// Reads a scenario from a file, or from the pipe of a shell substitution.
     ///
     /// # Errors

@@ -14,10 +14,7 @@ use harness_bench::scenario::write::write;
 const HEADER: &str = "title   Telegrams\nsource  nordac 3.2.1\nbus     nordac\n";
 
 fn source(text: &str) -> Source {
-    Source {
-        name: "nordac.scn".to_owned(),
-        text: text.into(),
-    }
+    Source::new("nordac.scn", text)
 }
 
 /// The verdict of these lines after the common header, and what was wrong.

@@ -14,10 +14,7 @@ use harness_bench::scenario::write::write;
 const HEADER: &str = "title   Frames\nsource  unitek 5.4 ex 8\nbus     unitek\n";
 
 fn source(text: &str) -> Source {
-    Source {
-        name: "unitek.scn".to_owned(),
-        text: text.into(),
-    }
+    Source::new("unitek.scn", text)
 }
 
 /// The verdict of these lines after the common header, and what was wrong.

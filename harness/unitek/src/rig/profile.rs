@@ -24,10 +24,7 @@ impl ProfileSettings {
         let Some(profile) = &rig.profile else {
             return Self::default();
         };
-        let source = Source {
-            name: "profile".to_owned(),
-            text: profile.lines.join("\n").into(),
-        };
+        let source = Source::new("profile", profile.lines.join("\n"));
         // The file was checked.
         let read: Result<Scenario<Unitek>, Problems> = read(&source, Part::Header);
         let lines = read.map_or_else(|_| Vec::new(), |scenario| scenario.header.drives);

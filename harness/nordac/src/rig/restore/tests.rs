@@ -113,10 +113,7 @@ impl Desk {
 }
 
 fn source(text: &str) -> Source {
-    Source {
-        name: "t.scn".to_owned(),
-        text: format!("title T\nbus nordac\n{text}").into(),
-    }
+    Source::new("t.scn", format!("title T\nbus nordac\n{text}"))
 }
 
 fn verdict(played: &(Outcome, Vec<String>)) -> Verdict {
@@ -252,10 +249,7 @@ fn what_does_not_end_has_foretold_what_it_changes() {
         let text = format!(
             "title T\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 PKW={task}\nwait 5ms\n"
         );
-        let scenario = RigScenario::read(&Source {
-            name: "t.scn".to_owned(),
-            text: text.into(),
-        });
+        let scenario = RigScenario::read(&Source::new("t.scn", text));
         let scenario = Arc::new(scenario.expect("a scenario"));
         let broken_off = |after| {
             let mut desk = Desk::new(2, &[], Limits::unlimited());

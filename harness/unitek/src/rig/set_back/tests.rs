@@ -50,10 +50,7 @@ fn bench_within(
 }
 
 fn source(name: &str, text: &str) -> Source {
-    Source {
-        name: name.to_owned(),
-        text: text.into(),
-    }
+    Source::new(name, text)
 }
 
 fn play(run: &mut PortRun<Player>, text: &str) -> Verdict {

@@ -44,10 +44,7 @@ fn turns(slave: &Known) -> Vec<Turn> {
 }
 
 fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
-    let source = Source {
-        name: "x".to_owned(),
-        text: text.into(),
-    };
+    let source = Source::new("x", text);
     let scenario = RigScenario::read(&source).expect("a scenario");
     let limits = Limits::unlimited();
     let patience = Span::from_millis(5);
