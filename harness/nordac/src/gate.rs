@@ -211,11 +211,7 @@ mod tests {
     const PATIENCE: Span = Span::from_millis(5);
 
     fn bench(limits: Limits) -> Guarded<Bench> {
-        let setup = Setup {
-            rate: BusRate::K500,
-            slaves: vec![SlaveSetup::new(8)],
-            master: None,
-        };
+        let setup = Setup::new(BusRate::K500, vec![SlaveSetup::new(8)]);
         let slave = GuardedSlave {
             address: 8,
             ppo: Some(PpoType::One),
@@ -284,11 +280,7 @@ mod tests {
     #[test]
     fn nothing_is_sent_where_the_bench_only_listens() {
         let slaves = [SlaveSetup::new(8)];
-        let setup = Setup {
-            rate: BusRate::K500,
-            slaves: slaves.to_vec(),
-            master: None,
-        };
+        let setup = Setup::new(BusRate::K500, slaves.to_vec());
         let mut line = guarded(Bench::new(&setup), Limits::unlimited(), &[], true);
         let denied = send(&mut line, &[&octets("10 08 02 49 53 16")]).expect("denied");
         assert!(denied.contains("listen_only"), "{denied}");

@@ -46,7 +46,8 @@ pub(crate) fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
         let pdu = first.request(service, data).ok()?;
         Some(Telegram::Pdu(pdu).encode().to_vec())
     };
-    let words = |address, ppo| telegram(address, Service::DataExchange, &safe_image().encode(ppo));
+    let safe = Image::of_words(stw::SAFE, 0);
+    let words = |address, ppo| telegram(address, Service::DataExchange, &safe.encode(ppo));
     let at_once = slaves.iter();
     let at_once = at_once.filter_map(|slave| words(slave.address, slave.ppo?));
     let again = slaves.iter().flat_map(|slave| {
@@ -65,17 +66,6 @@ pub(crate) fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
         })
     });
     at_once.chain(again.flatten()).collect()
-}
-
-fn image(word: u16) -> Image {
-    Image {
-        words: [word, 0, 0, 0, 0, 0],
-        ..Image::default()
-    }
-}
-
-fn safe_image() -> Image {
-    image(stw::SAFE)
 }
 
 /// Takes every inverter to its safe state and reads it back. One that runs is first stopped on its quick-stop ramp (1615), where the rig's
@@ -259,7 +249,7 @@ impl Shutdown<'_, '_> {
         let (address, ppo) = (self.address, self.ppo);
         let (mut tries, mut refused) = (0..TRIES, None);
         loop {
-            let exchanged = self.talk.exchange(address, ppo, &image(word));
+            let exchanged = self.talk.exchange(address, ppo, &Image::of_words(word, 0));
             let error = match exchanged {
                 Ok(inputs) => return Ok(inputs.first()),
                 Err(error) if !has_left(&error) => return Err(error.to_string()),

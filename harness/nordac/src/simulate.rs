@@ -94,6 +94,17 @@ pub(crate) struct Setup {
     pub(crate) master: Option<&'static MasterDeviation>,
 }
 
+impl Setup {
+    /// These slaves, behind a master that does not deviate.
+    pub(crate) const fn new(rate: BusRate, slaves: Vec<SlaveSetup>) -> Self {
+        Self {
+            rate,
+            slaves,
+            master: None,
+        }
+    }
+}
+
 /// A station of the segment: a host, or a slave.
 pub(crate) type SegmentStation = Member<Box<Deviant>>;
 

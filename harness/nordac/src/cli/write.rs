@@ -57,10 +57,7 @@ pub(super) fn refuse_denied(
         let parameter = order.parameter.parameter;
         let raw = parameter.raw_of(order.number).unwrap_or_default();
         let ak = Task::change(parameter).ak();
-        let image = Image {
-            pkw: Pkw::of(ak, parameter.number, order.parameter.ind(), raw),
-            ..Image::default()
-        };
+        let image = Image::from(Pkw::of(ak, parameter.number, order.parameter.ind(), raw));
         if let Some(why) = driver.denied(slave, &image)? {
             return Err(Failure::refused(format!("nothing was written: {why}")));
         }

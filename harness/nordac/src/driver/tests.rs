@@ -26,11 +26,7 @@ fn slave(address: u8, ppo: PpoType, more: &[(u16, i64)]) -> SlaveSetup {
 }
 
 fn bench(rate: BusRate, slaves: &[SlaveSetup]) -> Bench {
-    Bench::new(&Setup {
-        rate,
-        slaves: slaves.to_vec(),
-        master: None,
-    })
+    Bench::new(&Setup::new(rate, slaves.to_vec()))
 }
 
 fn driver(bench: &mut Bench, rate: BusRate) -> Driver<'_> {
@@ -303,11 +299,7 @@ fn a_lost_slave_is_left_alone() {
 #[test]
 fn another_master_on_the_line() {
     use harness_sim::octet_segment::{Octet, Wish};
-    let setup = Setup {
-        rate: BusRate::K500,
-        slaves: vec![slave(8, PpoType::One, &[])],
-        master: None,
-    };
+    let setup = Setup::new(BusRate::K500, vec![slave(8, PpoType::One, &[])]);
     let mut bench = Bench::with_guests(&setup, 1);
     let token = [0xDC, 3, 3].map(Octet::from).to_vec();
     let wish = Wish {

@@ -191,10 +191,7 @@ fn confirmed(slave: RigSlave, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<P
         return Ok(None);
     };
     let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default());
-    let outputs = Image {
-        pkw: task,
-        ..Image::default()
-    };
+    let outputs = Image::from(task);
     for _ in 0..MOST_EXCHANGES {
         let shown = talk.exchange(address, ppo, &outputs)?.pkw;
         if shown == last {

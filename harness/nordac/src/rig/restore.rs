@@ -294,10 +294,7 @@ impl<'k, 'l> Restoration<'k, 'l> {
     fn without_fault(&mut self, player: &Player) -> Result<(), TalkError> {
         self.begin()?;
         let (slave, ppo) = (self.slave.address, self.slave.ppo.unwrap_or_default());
-        let off = Image {
-            words: [stw::SAFE, 0, 0, 0, 0, 0],
-            ..Image::default()
-        };
+        let off = Image::of_words(stw::SAFE, 0);
         let zsw = self.talk.exchange(slave, ppo, &off)?.words[0];
         player.without_fault(slave, ppo, zsw, &mut self.talk)
     }

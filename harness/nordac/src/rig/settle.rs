@@ -67,7 +67,7 @@ pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<u16, TalkErro
     let (slave, ppo) = (known.slave.address, known.ppo());
     talk.restart(slave);
     talk.start(slave, ppo, Some(FORGET))?;
-    let shown = talk.exchange(slave, ppo, &image(stw::SAFE))?;
+    let shown = talk.exchange(slave, ppo, &Image::of_words(stw::SAFE, 0))?;
     talk.pass(FORGOTTEN)?;
     Ok(shown.words[0])
 }
@@ -102,7 +102,7 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkErr
     }
     for word in WORDS {
         for _ in 0..TIMES {
-            talk.exchange(slave, ppo, &image(word))?;
+            talk.exchange(slave, ppo, &Image::of_words(word, 0))?;
         }
     }
     if ppo.has_pkw() {
@@ -113,10 +113,7 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkErr
             .filter(|task| !remembers || !FAULT_MEMORY.contains(&task.number()))
         {
             for pkw in [*task, Pkw::default()] {
-                let outputs = Image {
-                    pkw,
-                    ..Image::default()
-                };
+                let outputs = Image::from(pkw);
                 for _ in 0..ANSWERED {
                     talk.exchange(slave, ppo, &outputs)?;
                 }
@@ -124,13 +121,6 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkErr
         }
     }
     Ok(())
-}
-
-fn image(word: u16) -> Image {
-    Image {
-        words: [word, 0, 0, 0, 0, 0],
-        ..Image::default()
-    }
 }
 
 /// The properties that explain what slaves did, slave by slave.

@@ -35,11 +35,7 @@ fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<RigSlav
         ppo: Some(slave.ppo),
     });
     let known: Vec<_> = known.collect();
-    let setup = Setup {
-        rate: BusRate::K500,
-        slaves,
-        master: None,
-    };
+    let setup = Setup::new(BusRate::K500, slaves);
     let gated: Vec<GuardedSlave> = known.iter().copied().map(Into::into).collect();
     (guarded(Bench::new(&setup), limits, &gated, false), known)
 }
@@ -51,10 +47,7 @@ fn run(line: &mut Guarded<Bench>, slaves: &[RigSlave]) {
         let ppo = slave.ppo.expect("known");
         talk.start(slave.address, ppo, None).expect("starts");
         for word in [stw::READY, stw::START, stw::START] {
-            let words = Image {
-                words: [word, 0x2000, 0, 0, 0, 0],
-                ..Image::default()
-            };
+            let words = Image::of_words(word, 0x2000);
             talk.exchange(slave.address, ppo, &words).expect("answers");
         }
         talk.pass(Span::from_millis(2_000)).expect("sound");
@@ -130,7 +123,7 @@ fn other_ways_in() {
                     talk.send(&octets).expect("sent");
                     talk.pass(PATIENCE).expect("sound");
                 }
-                let started = talk.exchange(8, PpoType::One, &image(stw::START));
+                let started = talk.exchange(8, PpoType::One, &Image::of_words(stw::START, 0));
                 started.expect("answers");
                 let both = GlobalControl::SYNC | GlobalControl::FREEZE;
                 talk.command(8, both).expect("sent");
@@ -162,7 +155,7 @@ fn a_late_reply_is_not_taken_for_another() {
     let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::unlimited());
     run(&mut line, &slaves);
     let control = FrameControl::request(Function::SrdHigh, Sequence::First);
-    let words = image(stw::START).encode(PpoType::One);
+    let words = Image::of_words(stw::START, 0).encode(PpoType::One);
     let exchange = Pdu::new(8, MASTER, control, &words).expect("fits");
     line.send_octets(0, &Telegram::Pdu(exchange).encode());
     let safe = safe(
@@ -216,10 +209,7 @@ fn a_begun_telegram_does_not_keep_the_stop_back() {
     // 047F with an HSW that makes the FCS 68.
     let telegram = (0..=u16::MAX).find_map(|main| {
         let control = FrameControl::request(Function::SrdHigh, Sequence::First);
-        let words = Image {
-            words: [stw::START, main, 0, 0, 0, 0],
-            ..Image::default()
-        };
+        let words = Image::of_words(stw::START, main);
         let pdu = Pdu::new(8, MASTER, control, &words.encode(PpoType::One)).ok()?;
         let octets = Telegram::Pdu(pdu).encode().to_vec();
         (octets[octets.len() - 2] == SD2).then_some(octets)

@@ -120,7 +120,25 @@ pub struct Image {
     pub words: [u16; 6],
 }
 
+impl From<Pkw> for Image {
+    fn from(pkw: Pkw) -> Self {
+        Self {
+            pkw,
+            ..Self::default()
+        }
+    }
+}
+
 impl Image {
+    /// These two process words, STW and HSW or ZSW and HIW; all else is 0.
+    #[must_use]
+    pub const fn of_words(first: u16, main: u16) -> Self {
+        Self {
+            pkw: Pkw::of(0, 0, 0, 0),
+            words: [first, main, 0, 0, 0, 0],
+        }
+    }
+
     /// Reads the data of a Data_Exchange; `None` if it has another length than the type.
     #[must_use]
     pub fn decode(ppo: PpoType, data: &[u8]) -> Option<Self> {

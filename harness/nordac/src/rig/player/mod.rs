@@ -505,11 +505,7 @@ impl Player {
             ppo: Some(slave.ppo),
         });
         let gated: Vec<_> = gated.collect();
-        let setup = simulate::Setup {
-            rate: self.rate,
-            slaves,
-            master: None,
-        };
+        let setup = simulate::Setup::new(self.rate, slaves);
         let mut link = guarded(Bench::new(&setup), *limits, &gated, false);
         if let Some(gate) = link.slaves_mut() {
             for known in self.known() {

@@ -46,10 +46,7 @@ impl Player {
             let ppo = known.ppo();
             talk.restart(address);
             talk.start(address, ppo, None)?;
-            let off = Image {
-                words: [stw::SAFE, 0, 0, 0, 0, 0],
-                ..Image::default()
-            };
+            let off = Image::of_words(stw::SAFE, 0);
             talk.exchange(address, ppo, &off)?;
             if !self.restarts {
                 // A slave whose terminals control it during the scenario goes on holding this word.
@@ -133,10 +130,7 @@ impl Player {
         }
         let mut shown = zsw;
         for word in [stw::SAFE, stw::SAFE | stw::ACKNOWLEDGE, stw::SAFE, IDLE] {
-            let image = Image {
-                words: [word, 0, 0, 0, 0, 0],
-                ..Image::default()
-            };
+            let image = Image::of_words(word, 0);
             for _ in 0..ACKNOWLEDGED {
                 shown = talk.exchange(slave, ppo, &image)?.words[0];
             }
@@ -150,10 +144,7 @@ impl Player {
 
 /// Gives a slave in the exchange the word that it holds when a scenario begins. Returns its status word.
 pub(in crate::rig) fn idle(slave: u8, ppo: PpoType, talk: &mut Talk<'_>) -> Result<u16, TalkError> {
-    let image = Image {
-        words: [IDLE, 0, 0, 0, 0, 0],
-        ..Image::default()
-    };
+    let image = Image::of_words(IDLE, 0);
     let mut zsw = 0;
     for _ in 0..IDLE_TIMES {
         zsw = talk.exchange(slave, ppo, &image)?.words[0];

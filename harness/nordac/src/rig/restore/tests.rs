@@ -50,11 +50,7 @@ impl Desk {
             .parameters
             .push((control, Index::default(), interface));
         let others = others.iter().map(|address| SlaveSetup::new(*address));
-        let setup = Setup {
-            rate: RATE,
-            slaves: std::iter::once(first).chain(others).collect(),
-            master: None,
-        };
+        let setup = Setup::new(RATE, std::iter::once(first).chain(others).collect());
         let slaves: Vec<_> = setup
             .slaves
             .iter()
