@@ -34,7 +34,7 @@ use harness_bench::command::deviations::DeviationRow;
 use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
 use harness_bench::shown::SegmentReport as _;
-use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, deviations};
+use harness_sim::nordac::deviation::{DEVIATIONS, MASTER_DEVIATIONS};
 use harness_sim::nordac::fuzz;
 
 /// The GSD file: the unit master file of the manual.
@@ -51,10 +51,10 @@ pub static BUS: Bus = Bus {
     cell_names: || cli::cells::names().collect(),
     cells: cli::cells::cells,
     deviations: || {
-        let drives = deviations().map(|row| DeviationRow::new(row.name, row.section, row.about));
-        let masters = MASTER_DEVIATIONS.iter();
-        let masters = masters.map(|row| DeviationRow::new(row.name, row.section, row.about));
-        [drives.collect(), masters.collect()]
+        [
+            DeviationRow::all(&DEVIATIONS),
+            DeviationRow::all(&MASTER_DEVIATIONS),
+        ]
     },
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),

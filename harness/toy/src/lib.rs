@@ -24,6 +24,7 @@ use harness_bench::command::failure::Failure;
 use harness_bench::fuzz::comes_back;
 use harness_bench::manual::Manual;
 use harness_bench::scenario::settled::settle;
+use harness_sim::deviation::Deviation;
 
 /// Valves. What the bus does not have yet answers with a sentence that says so.
 pub static BUS: Bus = Bus {
@@ -48,7 +49,8 @@ pub static BUS: Bus = Bus {
     },
     deviations: || {
         let about = "the valve confirms a move and stays where it is";
-        [vec![DeviationRow::new("sticks", "2.1", about)], Vec::new()]
+        let sticks = DeviationRow::of(&Deviation::new("sticks", "2.1", about, ()));
+        [vec![sticks], Vec::new()]
     },
     dissector: || "-- there is no dissector of valves yet\n".to_owned(),
     sim: |_, _, _| Err(Failure::refused("valves are not served yet")),

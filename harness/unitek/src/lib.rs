@@ -31,7 +31,7 @@ use harness_bench::command::deviations::DeviationRow;
 use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
 use harness_bench::shown::SegmentReport as _;
-use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, deviations};
+use harness_sim::unitek::deviation::{DEVIATIONS, MASTER_DEVIATIONS};
 use harness_sim::unitek::fuzz;
 
 /// UNITEK DS/BAMOCAR on CAN.
@@ -45,10 +45,10 @@ pub static BUS: Bus = Bus {
     cell_names: || cli::cells::names().map(str::to_owned).collect(),
     cells: cli::cells::cells,
     deviations: || {
-        let drives = deviations().map(|row| DeviationRow::new(row.name, row.section, row.about));
-        let masters = MASTER_DEVIATIONS.iter();
-        let masters = masters.map(|row| DeviationRow::new(row.name, row.section, row.about));
-        [drives.collect(), masters.collect()]
+        [
+            DeviationRow::all(&DEVIATIONS),
+            DeviationRow::all(&MASTER_DEVIATIONS),
+        ]
     },
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),

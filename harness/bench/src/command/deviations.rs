@@ -1,5 +1,6 @@
 //! A row of `drivebench deviations`.
 
+use harness_sim::deviation::{Deviation, DeviationTable};
 use serde::Serialize;
 
 /// A deviation of a drive or of the bench's own master.
@@ -14,14 +15,20 @@ pub struct DeviationRow {
 }
 
 impl DeviationRow {
-    /// A row of a bus with one model of a drive.
+    /// The row of a deviation on a bus with one model of a drive.
     #[must_use]
-    pub const fn new(name: &'static str, section: &'static str, about: &'static str) -> Self {
+    pub const fn of<Injection>(deviation: &Deviation<Injection>) -> Self {
         Self {
-            name,
-            section,
-            about,
+            name: deviation.name,
+            section: deviation.section,
+            about: deviation.about,
             models: None,
         }
+    }
+
+    /// The rows of a table on a bus with one model of a drive.
+    #[must_use]
+    pub fn all<Injection>(table: &DeviationTable<Injection>) -> Vec<Self> {
+        table.all().map(Self::of).collect()
     }
 }

@@ -4,7 +4,7 @@
 //! `DEVIATIONS=update cargo test --test bus nordac` plays every scenario with every deviation and rewrites the file.
 
 use super::found::Deviations;
-use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, deviations};
+use harness_sim::nordac::deviation::{DEVIATIONS, MASTER_DEVIATIONS};
 
 #[test]
 fn every_deviation_is_found() {
@@ -17,8 +17,8 @@ fn every_deviation_is_found() {
         bus: "bus     nordac\n",
         device: "slave",
         driven: "",
-        drives: deviations().map(|own| own.name).collect(),
-        masters: MASTER_DEVIATIONS.iter().map(|own| own.name).collect(),
+        drives: DEVIATIONS.names(),
+        masters: MASTER_DEVIATIONS.names(),
     };
     all.all_are_found();
 }

@@ -4,7 +4,7 @@
 //! `DEVIATIONS=update cargo test --test bus unitek` plays every scenario with every deviation and rewrites the file.
 
 use super::found::Deviations;
-use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, deviations};
+use harness_sim::unitek::deviation::{DEVIATIONS, MASTER_DEVIATIONS};
 
 #[test]
 fn every_deviation_is_found() {
@@ -17,8 +17,8 @@ fn every_deviation_is_found() {
         bus: "bus     unitek\n",
         device: "drive",
         driven: "\nmaster ",
-        drives: deviations().map(|own| own.name).collect(),
-        masters: MASTER_DEVIATIONS.iter().map(|own| own.name).collect(),
+        drives: DEVIATIONS.names(),
+        masters: MASTER_DEVIATIONS.names(),
     };
     all.all_are_found();
 }

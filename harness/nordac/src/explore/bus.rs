@@ -24,7 +24,7 @@ use harness_bench::scenario::source::Source;
 use harness_proto::nordac::{PpoType, Properties};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Instant;
-use harness_sim::nordac::deviation::deviation;
+use harness_sim::nordac::deviation::DEVIATIONS;
 
 /// A slave as conversations address it: its address, and the PPO type that it is set to.
 type Station = (u8, PpoType);
@@ -172,7 +172,7 @@ impl LineBus for Nordac {
     }
 
     fn plant(setup: &mut Setup, slave: u8, name: &str) -> Option<bool> {
-        let known = deviation(name)?;
+        let known = DEVIATIONS.named(name)?;
         let own = setup.slaves.iter_mut().find(|own| own.address == slave);
         Some(own.map(|own| own.deviation = Some(known)).is_some())
     }

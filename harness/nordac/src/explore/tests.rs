@@ -6,7 +6,7 @@ use harness_bench::explore::line::trial::EngineTrial;
 use harness_bench::rig::find;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
-use harness_sim::nordac::deviation::deviations;
+use harness_sim::nordac::deviation::DEVIATIONS;
 use std::path::Path;
 
 fn trial(ppo: PpoType, header: &[&str]) -> EngineTrial<Nordac> {
@@ -112,7 +112,7 @@ fn wrong_slaves_are_found_and_their_findings_are_scenarios() {
 #[test]
 #[ignore = "every wrong slave, some minutes; .ci/nightly runs it"]
 fn nearly_all_wrong_slaves_are_found() {
-    let missed = usual().missed(deviations().map(|own| own.name));
+    let missed = usual().missed(DEVIATIONS.all().map(|deviation| deviation.name));
     assert!(missed.len() <= 6, "{missed:?}");
 }
 

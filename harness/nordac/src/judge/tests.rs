@@ -10,7 +10,7 @@ use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 use harness_proto::time::{Instant, Span};
-use harness_sim::nordac::deviation::deviations;
+use harness_sim::nordac::deviation::DEVIATIONS;
 use harness_sim::record::{LineByte, Trace};
 use std::collections::BTreeSet;
 
@@ -254,7 +254,7 @@ fn wrong_slaves_are_accused() {
         .map(|scenario| doubts(&judged(scenario, "")))
         .collect();
     let (mut missed, mut passed) = (Vec::new(), Vec::new());
-    for name in deviations().map(|deviation| deviation.name) {
+    for name in DEVIATIONS.all().map(|deviation| deviation.name) {
         let mut in_doubt = false;
         let accused = scenarios.iter().zip(&right).any(|(source, right)| {
             let judged = judged(source, &of_all(source, &format!("deviates {name}")));

@@ -302,7 +302,7 @@ mod tests {
     use harness_bench::scenario::run::{AtMismatch, play};
     use harness_bench::scenario::source::Source;
     use harness_proto::nordac::PpoType;
-    use harness_sim::nordac::deviation::deviation;
+    use harness_sim::nordac::deviation::DEVIATIONS;
 
     const SLAVE: RigSlave = RigSlave {
         address: 8,
@@ -351,7 +351,7 @@ mod tests {
             };
             let own = RigScenario::read(&source).expect("a conversation");
             let mut slaves = own.plan.setup.slaves.clone();
-            slaves[0].deviation = deviates.map(|name| deviation(name).expect("a deviation"));
+            slaves[0].deviation = deviates.map(|name| DEVIATIONS.named(name).expect("a deviation"));
             let rate = BusRate::K500;
             let setup = Setup {
                 rate,

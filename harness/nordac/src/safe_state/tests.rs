@@ -12,7 +12,7 @@ use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{FrameControl, Function, Sequence};
 use harness_proto::profibus::{BusRate, Pdu};
-use harness_sim::nordac::deviation::deviations;
+use harness_sim::nordac::deviation::DEVIATIONS;
 
 const PATIENCE: Span = Span::from_millis(5);
 
@@ -189,7 +189,7 @@ fn a_silent_slave_is_not_confirmed_and_the_others_are_stopped() {
 fn an_output_that_stays_on_is_not_confirmed() {
     for latency in [1, 5, 20] {
         let mut deaf = slave(8, PpoType::One);
-        deaf.deviation = harness_sim::nordac::deviation::deviation("no-off2");
+        deaf.deviation = DEVIATIONS.named("no-off2");
         assert!(deaf.deviation.is_some());
         deaf.properties.pzd_latency = latency;
         let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
@@ -282,7 +282,9 @@ fn a_computer_that_stands_still_accuses_no_inverter() {
         let mut setup = slave(8, PpoType::One);
         assert!(latency.set(&mut setup.properties, "2"));
         if !obeys {
-            setup.deviation = deviations().find(|wrong| wrong.name == "always-enabled-shown");
+            setup.deviation = DEVIATIONS
+                .all()
+                .find(|deviation| deviation.name == "always-enabled-shown");
         }
         let (mut line, slaves) = line(vec![setup], Limits::unlimited());
         run(&mut line, &slaves);

@@ -58,7 +58,7 @@ impl RingSetup {
             .collect();
         deviates.extend_from_slice(more);
         let behind = |planted: &Planted| {
-            deviation::deviation(&planted.name).is_some_and(|known| known.behind_the_bus)
+            deviation::deviation(&planted.name).is_some_and(|known| known.is_behind_the_bus())
         };
         let nothing_said = rig.is_simulated() && rig.id().starts_with("sim-");
         if !header.names_a_model() && nothing_said && !whole && !deviates.iter().any(behind) {

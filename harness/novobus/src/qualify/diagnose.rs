@@ -5,7 +5,7 @@ use crate::language::syntax::{DriveRange, Header, Setup};
 use crate::rig::Driven;
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_sim::novobus::deviation::{
-    Deviation, MasterDeviation, deviations, master_deviations, relatives,
+    DEVIATIONS, Deviation, MASTER_DEVIATIONS, MasterDeviation, RELATIVES,
 };
 use std::collections::BTreeSet;
 use std::fmt;
@@ -115,11 +115,11 @@ pub(crate) fn name<E>(
     seen: &RingSeen<'_>,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Vec<Named> {
-    let mut named = name_among(seen, candidates(seen, deviations()), twin);
+    let mut named = name_among(seen, candidates(seen, DEVIATIONS.all()), twin);
     if !named.is_empty() && seen.exactness.knows_cells {
         return named;
     }
-    let mut relatives = name_among(seen, candidates(seen, relatives()), twin);
+    let mut relatives = name_among(seen, candidates(seen, RELATIVES.all()), twin);
     let of_all = |named: &[Named]| named.iter().any(|own| own.whose == Whose::Every);
     if named.is_empty() || of_all(&named) && !of_all(&relatives) && !relatives.is_empty() {
         return relatives;
@@ -267,7 +267,7 @@ pub(crate) fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDevia
         let mut all = attempts.iter();
         all.all(|driven| driven.is_explained_by(Some(deviation)))
     };
-    master_deviations().filter(explains).collect()
+    MASTER_DEVIATIONS.all().filter(explains).collect()
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use harness_bench::rig::{PlayedScenario, UseOptions};
 use harness_bench::scenario::run::run;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
-use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{DEVIATIONS, Deviation, MASTER_DEVIATIONS};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -150,9 +150,9 @@ fn search() -> String {
         candidates
     });
     let mut text = HEAD.to_owned();
-    for deviation in deviations() {
+    for deviation in DEVIATIONS.all() {
         let mut by = Found::default();
-        for candidate in &candidates[usize::from(deviation.behind_the_bus)] {
+        for candidate in &candidates[usize::from(deviation.is_behind_the_bus())] {
             let place = match candidate.finds(deviation) {
                 Some(Means::Wire) => &mut by.wire,
                 Some(Means::Faults) => &mut by.faults,
@@ -183,7 +183,7 @@ fn every_deviation_is_found() {
     let found: BTreeMap<String, Found> = toml::from_str(&text).expect("a table");
     let scenarios = scenarios();
     let mut unseen = Vec::new();
-    for deviation in deviations() {
+    for deviation in DEVIATIONS.all() {
         let by = found.get(deviation.name).cloned().unwrap_or_default();
         let means = [
             (by.wire, Means::Wire),
@@ -194,7 +194,7 @@ fn every_deviation_is_found() {
         for (name, means) in means.into_iter().filter_map(|(name, m)| Some((name?, m))) {
             let entry = scenarios.iter().find(|entry| entry.short_name() == name);
             let entry = entry.unwrap_or_else(|| panic!("no scenario {name}"));
-            let candidate = Candidate::new(entry, deviation.behind_the_bus);
+            let candidate = Candidate::new(entry, deviation.is_behind_the_bus());
             let found = candidate.and_then(|candidate| candidate.finds(deviation));
             assert_eq!(found, Some(means), "{}: {name}", deviation.name);
             any = true;
@@ -204,7 +204,7 @@ fn every_deviation_is_found() {
         }
     }
     assert!(unseen.is_empty(), "no scenario finds {unseen:?}");
-    let names: Vec<_> = deviations().map(|d| d.name).collect();
+    let names = DEVIATIONS.names();
     let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
     assert_eq!(unknown, None, "{FILE} names a deviation that there is not");
 }
@@ -213,7 +213,7 @@ fn every_deviation_is_found() {
 fn masters() -> BTreeMap<String, String> {
     let text = std::fs::read_to_string(Path::new(ROOT).join(MASTERS));
     let found: BTreeMap<String, String> = toml::from_str(&text.expect("a file")).expect("a table");
-    let names: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let names = MASTER_DEVIATIONS.names();
     let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
     assert_eq!(
         unknown, None,
@@ -237,7 +237,7 @@ fn found_by<'s>(
 #[test]
 fn every_wrong_master_is_found() {
     let (by, scenarios) = (masters(), scenarios());
-    for deviation in master_deviations() {
+    for deviation in MASTER_DEVIATIONS.all() {
         let entry = found_by(deviation.name, &by, &scenarios);
         let mut plan = entry.plan.clone();
         for (master, verdict) in [(None, Verdict::Passed), (Some(deviation), Verdict::Failed)] {
@@ -252,7 +252,7 @@ fn every_wrong_master_is_found() {
 #[test]
 fn every_wrong_master_is_named() {
     let (by, scenarios) = (masters(), scenarios());
-    for deviation in master_deviations() {
+    for deviation in MASTER_DEVIATIONS.all() {
         let text = format!(
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n\
              [sim]\nsetup = [\"master deviates {}\"]\n\
@@ -358,13 +358,13 @@ fn a_broken_sequence_is_tried_with_every_drive() {
 
 #[test]
 fn names_are_unique_and_sections_are_the_manuals() {
-    let mut names: Vec<_> = deviations().map(|d| d.name).collect();
+    let mut names = DEVIATIONS.names();
     names.sort_unstable();
     let all = names.len();
     names.dedup();
     assert_eq!(names.len(), all);
     assert!(all >= 40, "{all}");
-    for deviation in deviations() {
+    for deviation in DEVIATIONS.all() {
         let kebab = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         assert!(deviation.name.chars().all(kebab), "{}", deviation.name);
         let chapter = deviation.section.split('.').next();

@@ -21,7 +21,7 @@ use harness_bench::link::{Capability, LinkEvent, Octets, Recording};
 use harness_bench::scenario::run::lacks;
 use harness_bench::scenario::source::Source;
 use harness_proto::time::Span;
-use harness_sim::novobus::deviation::{Deviation, deviations, relatives};
+use harness_sim::novobus::deviation::{DEVIATIONS, Deviation, RELATIVES};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 
@@ -300,7 +300,9 @@ const SOME: usize = 16;
 /// its own answers differ, as for a deviation without a name. At least `named` deviations must be named, and `culprits` drives blamed.
 fn planted_in_turn(step: usize, named: usize, culprits: usize) {
     let (mut ends, mut blamed) = (BTreeMap::new(), 0);
-    let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
+    let of_the_bus = DEVIATIONS
+        .all()
+        .filter(|deviation| !deviation.is_behind_the_bus());
     for (planted, drive) in of_the_bus.zip((0..DRIVES).cycle()).step_by(step) {
         let (end, is_blamed) = end(planted, Some(drive));
         blamed += usize::from(is_blamed);
@@ -516,7 +518,7 @@ fn all_other_numbers() {
 /// Every `step`-th relative is named, or nothing is; at least `named` of them are.
 fn with_other_numbers(step: usize, named: usize) {
     let mut ends = BTreeMap::new();
-    for (planted, drive) in relatives().step_by(step).zip((0..DRIVES).cycle()) {
+    for (planted, drive) in RELATIVES.all().step_by(step).zip((0..DRIVES).cycle()) {
         let (end, _) = end(planted, Some(drive));
         *ends.entry(end).or_insert(0) += 1;
     }
@@ -540,7 +542,9 @@ fn all_planted_in_every_drive() {
 
 /// In every drive: it is named for all of them, or for none.
 fn planted_in_every_drive(step: usize) {
-    let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
+    let of_the_bus = DEVIATIONS
+        .all()
+        .filter(|deviation| !deviation.is_behind_the_bus());
     for planted in of_the_bus.step_by(step) {
         let lines = [format!("drive 0..last deviates {}", planted.name)];
         let own = verdict(&lines);

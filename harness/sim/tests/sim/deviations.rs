@@ -10,7 +10,7 @@ use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::{Flips, LinkFault};
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, factory};
-use harness_sim::novobus::deviation::{Deviant, Deviation, deviation, deviations};
+use harness_sim::novobus::deviation::{DEVIATIONS, Deviant, Deviation, deviation};
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::plain::PlainDrive;
@@ -131,7 +131,7 @@ proptest! {
         first in any::<proptest::sample::Index>(),
         second in any::<proptest::sample::Index>(),
     ) {
-        let all: Vec<_> = deviations().collect();
+        let all: Vec<_> = DEVIATIONS.all().collect();
         let with = [*first.get(&all), *second.get(&all)];
         let trace = play(&pieces, flip, || wrong(true, &with));
         for link in &trace.channels {

@@ -25,7 +25,7 @@ use harness_proto::time::Instant;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::properties::Properties;
 use harness_sim::record::LineFrame;
-use harness_sim::unitek::deviation::deviation;
+use harness_sim::unitek::deviation::DEVIATIONS;
 
 impl Differing for FrameDifference {
     fn is_like(&self, other: &Self) -> bool {
@@ -172,7 +172,7 @@ impl LineBus for Unitek {
     }
 
     fn plant(setup: &mut Setup, drive: u8, name: &str) -> Option<bool> {
-        let known = deviation(name)?;
+        let known = DEVIATIONS.named(name)?;
         let own = setup.drives.iter_mut().find(|own| own.node == drive);
         Some(own.map(|own| own.deviation = Some(known)).is_some())
     }

@@ -5,7 +5,7 @@ use crate::language::Unitek;
 use harness_bench::explore::line::trial::EngineTrial;
 use harness_bench::rig::find;
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
-use harness_sim::unitek::deviation::deviations;
+use harness_sim::unitek::deviation::DEVIATIONS;
 use std::path::Path;
 
 fn usual() -> EngineTrial<Unitek> {
@@ -80,14 +80,14 @@ fn behind_an_adapter(headers: impl IntoIterator<Item = Vec<String>>, seconds: u6
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_drives_are_found_and_their_findings_are_scenarios() {
-    let missed = usual().missed(deviations().step_by(30).map(|own| own.name));
+    let missed = usual().missed(DEVIATIONS.all().step_by(30).map(|deviation| deviation.name));
     assert!(missed.is_empty(), "{missed:?}");
 }
 
 #[test]
 #[ignore = "a minute; the nightly run plays it"]
 fn nearly_all_wrong_drives_are_found() {
-    let missed = usual().missed(deviations().map(|own| own.name));
+    let missed = usual().missed(DEVIATIONS.all().map(|deviation| deviation.name));
     assert!(missed.len() <= 6, "{missed:?}");
 }
 

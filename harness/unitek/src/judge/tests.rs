@@ -10,7 +10,7 @@ use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 use harness_sim::record::{FrameEnd, LineFrame};
-use harness_sim::unitek::deviation::deviations;
+use harness_sim::unitek::deviation::DEVIATIONS;
 use std::collections::BTreeSet;
 
 const BUS: &str = "bus     unitek\n";
@@ -231,6 +231,9 @@ fn missed(share: usize) -> Vec<&'static str> {
                 .is_empty()
         })
     };
-    let names = deviations().step_by(share).map(|deviation| deviation.name);
+    let names = DEVIATIONS
+        .all()
+        .step_by(share)
+        .map(|deviation| deviation.name);
     names.filter(|name| !found(name)).collect()
 }

@@ -11,7 +11,7 @@ use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 use harness_sim::record::FrameEnd;
-use harness_sim::unitek::deviation::deviations;
+use harness_sim::unitek::deviation::DEVIATIONS;
 use std::sync::Arc;
 
 /// What happens to a drive beside the bus in a scenario, which no frame shows.
@@ -134,9 +134,9 @@ fn is_found(deviation: &str, all: &[Source]) -> bool {
 #[test]
 fn wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
-    let names = deviations().map(|deviation| deviation.name);
-    let names = names.filter(|name| !NOT_FOUND.contains(name)).step_by(4);
-    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
+    let names = DEVIATIONS.all().map(|deviation| deviation.name);
+    let names = names.filter(|own| !NOT_FOUND.contains(own)).step_by(4);
+    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
     assert_eq!(missed, [""; 0]);
 }
 
@@ -144,8 +144,8 @@ fn wrong_drives_are_found_by_what_they_send() {
 #[ignore = "every wrong drive; .ci/nightly runs it"]
 fn which_wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
-    let names = deviations().map(|deviation| deviation.name);
-    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
+    let names = DEVIATIONS.all().map(|deviation| deviation.name);
+    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
     assert_eq!(missed, NOT_FOUND);
 }
 

@@ -80,9 +80,7 @@ fn master(
     header: &mut Header,
     begun: bool,
 ) -> Result<(), Problem> {
-    let names = MASTER_DEVIATIONS.iter().map(|wrong| (wrong.name, wrong));
-    let names: Vec<_> = names.collect();
-    deviating_master(word, scanner, &mut header.master, begun, &names)
+    deviating_master(word, scanner, &mut header.master, begun, &MASTER_DEVIATIONS)
 }
 
 /// A line that begins with `drive` is a header line where it can be one.

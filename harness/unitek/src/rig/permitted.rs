@@ -117,6 +117,6 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
             }
         }),
         named: named.flat_map(|name| special_register(name)).collect(),
-        ranges: own.port.ranges.iter().flat_map(value_range).collect(),
+        ranges: granted.port.ranges.iter().flat_map(value_range).collect(),
     }
 }

@@ -8,7 +8,7 @@ use harness_bench::link::{DriveFault, FrameFault, Link, Moment, PlacedFault};
 use harness_bench::medium::Out;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{IdChange, RateChange};
-use harness_sim::unitek::deviation::deviations;
+use harness_sim::unitek::deviation::DEVIATIONS;
 
 const PATIENCE: Span = Span::from_millis(20);
 
@@ -254,7 +254,9 @@ fn an_identifier_that_is_not_used_yet_is_set_back() {
 #[test]
 fn two_drives_on_one_identifier_are_named() {
     let mut setup = Setup::of(2);
-    let wrong = deviations().find(|deviation| deviation.name == "hears-its-neighbour");
+    let wrong = DEVIATIONS
+        .all()
+        .find(|deviation| deviation.name == "hears-its-neighbour");
     setup.drives[0].deviation = wrong;
     let mut line = of(&setup, Limits::unlimited());
     send(&mut line, &["202#687E02"]);

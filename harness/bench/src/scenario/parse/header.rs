@@ -10,6 +10,7 @@ use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{Action, Citation, Scenario, Step};
 use crate::scenario::times;
+use harness_sim::deviation::{Deviation, DeviationTable};
 
 /// The most lines of a scenario.
 const MAX_LINES: usize = 20_000;
@@ -282,12 +283,12 @@ pub fn once<T>(place: &mut Option<T>, value: T, word: &Spanned<&str>) -> Result<
 ///
 /// # Errors
 /// It names no deviation, or stands elsewhere or twice.
-pub fn deviating_master<T: Copy>(
+pub fn deviating_master<Injection>(
     word: &Spanned<&str>,
     scanner: &mut Scanner<'_>,
-    place: &mut Option<T>,
+    place: &mut Option<&'static Deviation<Injection>>,
     begun: bool,
-    names: &[(&str, T)],
+    table: &DeviationTable<Injection>,
 ) -> Result<(), Problem> {
     let line = Spanned {
         value: "master deviates",
@@ -298,7 +299,7 @@ pub fn deviating_master<T: Copy>(
         return Err(problem.help("move the line up, above the first step"));
     }
     required(scanner, &["deviates"])?;
-    let value = deviation(scanner, names, "a master", "`master deviates NAME`")?;
+    let value = deviation(scanner, table, "a master", "`master deviates NAME`")?;
     scanner.expect_end()?;
     once(place, value, &line)
 }

@@ -2,6 +2,7 @@
 
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
+use harness_sim::deviation::{Deviation, DeviationTable};
 
 /// Reads one of a list of words.
 pub fn named<T: Copy>(
@@ -26,21 +27,20 @@ pub fn named<T: Copy>(
 }
 
 /// The name of a deviation. There are too many to list them all in a message.
-pub fn deviation<T: Copy>(
+pub fn deviation<Injection>(
     scanner: &mut Scanner<'_>,
-    names: &[(&str, T)],
+    table: &DeviationTable<Injection>,
     of: &str,
     line: &str,
-) -> Result<T, Problem> {
+) -> Result<&'static Deviation<Injection>, Problem> {
     let before = scanner.clone();
     let word = scanner.word().map_or("", |word| word.value);
-    if let Some((_, found)) = names.iter().find(|(name, _)| *name == word) {
-        return Ok(*found);
-    }
-    *scanner = before;
-    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
-    let expected = format!("the name of a deviation of {of}, as in {line}");
-    Err(scanner.unexpected(&expected).did_you_mean(word, &known))
+    table.named(word).ok_or_else(|| {
+        *scanner = before;
+        let expected = format!("the name of a deviation of {of}, as in {line}");
+        let problem = scanner.unexpected(&expected);
+        problem.did_you_mean(word, &table.names())
+    })
 }
 
 /// `=` must come next.

@@ -3,7 +3,7 @@
 use super::*;
 use crate::rig::values;
 use harness_proto::nordac::properties::PROPERTIES;
-use harness_sim::nordac::deviation::deviations;
+use harness_sim::nordac::deviation::DEVIATIONS;
 
 /// A low rate: a slave is judged by its telegrams, and fewer of them take as long.
 const RATE: BusRate = BusRate::K93_75;
@@ -59,7 +59,7 @@ fn every_value_of_every_property() {
 #[test]
 fn every_deviation_ends() {
     let mut troubled = 0;
-    for deviation in deviations() {
+    for deviation in DEVIATIONS.all() {
         let setup = SlaveSetup {
             deviation: Some(deviation),
             ..slave(8, PpoType::One, &RAMPS)

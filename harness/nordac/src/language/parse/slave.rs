@@ -9,7 +9,7 @@ use harness_bench::scenario::scanner::Scanner;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::Properties;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
-use harness_sim::nordac::deviation::{Deviation, deviations};
+use harness_sim::nordac::deviation::DEVIATIONS;
 
 pub(super) enum SlaveLine {
     /// A header line.
@@ -59,12 +59,8 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Pr
             SlaveLine::Setup(SetupKind::Parameter(name, value))
         }
         Word::Deviates => {
-            let names: Vec<(&str, &'static Deviation)> =
-                deviations().map(|wrong| (wrong.name, wrong)).collect();
-            let line = "`slave 8 deviates NAME`";
-            SlaveLine::Setup(SetupKind::Deviates(deviation(
-                scanner, &names, "a slave", line,
-            )?))
+            let known = deviation(scanner, &DEVIATIONS, "a slave", "`slave 8 deviates NAME`")?;
+            SlaveLine::Setup(SetupKind::Deviates(known))
         }
         Word::Link => {
             let ends = [("lost", false), ("found", true)];

@@ -21,7 +21,7 @@ use harness_proto::nordac::{Image, Parameter, PpoType};
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::{Pdu, Telegram};
 use harness_proto::time::Span;
-use harness_sim::nordac::deviation::{Deviation, deviations};
+use harness_sim::nordac::deviation::{DEVIATIONS, Deviation};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -335,7 +335,7 @@ impl Note for SlaveNote {
     type Deviation = Deviation;
 
     fn deviations() -> Vec<&'static Deviation> {
-        deviations().collect()
+        DEVIATIONS.all().collect()
     }
 
     fn words(deviation: &Deviation) -> String {

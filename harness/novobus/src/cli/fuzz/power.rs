@@ -13,7 +13,7 @@ use harness_bench::explore::{Bounds, ExploreError, Progress, Watcher};
 use harness_bench::rig::buses::RigBuses;
 use harness_bench::rig::find;
 use harness_proto::novobus::guard::Limits;
-use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{DEVIATIONS, Deviation, MASTER_DEVIATIONS};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -120,10 +120,12 @@ pub(super) fn power(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let filter = arguments.filter.as_deref().unwrap_or_default();
-    let wanted: Vec<_> = deviations()
+    let wanted: Vec<_> = DEVIATIONS
+        .all()
         .filter(|own| own.name.contains(filter))
         .collect();
-    let masters: Vec<_> = master_deviations()
+    let masters: Vec<_> = MASTER_DEVIATIONS
+        .all()
         .filter(|own| own.name.contains(filter) && !arguments.whole)
         .collect();
     if wanted.is_empty() && masters.is_empty() {

@@ -14,7 +14,7 @@ use harness_bench::explore::Planted;
 use harness_bench::explore::{ExploreError, Target};
 use harness_bench::rig::UseOptions;
 use harness_bench::rig::buses::RigBuses;
-use harness_sim::novobus::deviation::deviations;
+use harness_sim::novobus::deviation::DEVIATIONS;
 use std::path::Path;
 
 /// Makes a finding small, and writes what came of it beside it.
@@ -102,7 +102,7 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
     let drives = 0..finding.case.drives;
     let own = finding.difference.drive;
     let suspects: Vec<u8> = own.map_or_else(|| drives.collect(), |drive| vec![drive]);
-    for deviation in deviations() {
+    for deviation in DEVIATIONS.all() {
         for drive in &suspects {
             let name = deviation.name.to_owned();
             let planted = Planted {

@@ -5,25 +5,24 @@ use harness_bench::scenario::expression;
 pub(crate) use harness_bench::scenario::parse::words::{equals, named, required};
 use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
+use harness_sim::novobus::deviation::{DEVIATIONS, MASTER_DEVIATIONS, deviation};
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
-use harness_sim::novobus::deviation::{deviation, deviations, master_deviation, master_deviations};
 
 /// The name of a deviation of a drive.
 pub(crate) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
-    let names: Vec<_> = deviations().map(|d| d.name).collect();
-    let masters: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let others = MASTER_DEVIATIONS.names();
     let other = ("a drive", "a master", "`master deviates NAME`");
-    one_of(scanner, deviation, &names, &masters, other)
+    one_of(scanner, deviation, &DEVIATIONS.names(), &others, other)
 }
 
 /// The name of a deviation of the master.
 pub(crate) fn master_deviates(
     scanner: &mut Scanner<'_>,
 ) -> Result<&'static MasterDeviation, Problem> {
-    let names: Vec<_> = master_deviations().map(|d| d.name).collect();
-    let drives: Vec<_> = deviations().map(|d| d.name).collect();
+    let (names, others) = (MASTER_DEVIATIONS.names(), DEVIATIONS.names());
     let other = ("a master", "a drive", "`drive 2 deviates NAME`");
-    one_of(scanner, master_deviation, &names, &drives, other)
+    let find = |name: &str| MASTER_DEVIATIONS.named(name);
+    one_of(scanner, find, &names, &others, other)
 }
 
 /// Reads a name that `find` knows; `others` are names of the other end of the ring.

@@ -193,7 +193,7 @@ impl Planner {
                 (format!("`{}`", name.value), name.span)
             }
             SetupKind::Influence(Influence::Stimuli(_)) => (OUTSIDE.to_owned(), setup.span),
-            SetupKind::Deviates(deviation) if deviation.behind_the_bus => {
+            SetupKind::Deviates(deviation) if deviation.is_behind_the_bus() => {
                 (format!("`{}`", deviation.name), setup.span)
             }
             _ => return None,
@@ -236,7 +236,7 @@ pub(crate) fn model_unless_said(scenario: &Scenario<Novobus>) -> Model {
         .iter()
         .any(|setup| match &setup.what {
             SetupKind::Influence(Influence::Stimuli(_)) => true,
-            SetupKind::Deviates(deviation) => deviation.behind_the_bus,
+            SetupKind::Deviates(deviation) => deviation.is_behind_the_bus(),
             SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
                 PROPERTIES.iter().any(|own| own.name == name.value)
             }

@@ -8,7 +8,7 @@ use harness_bench::link::{Line as _, LinkEvent, Octets as _, Recording};
 use harness_bench::scenario::run::AtMismatch;
 use harness_bench::scenario::source::Source;
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::novobus::deviation::{Deviation, deviation, deviations};
+use harness_sim::novobus::deviation::{DEVIATIONS, Deviation, deviation};
 
 const DRIVES: u8 = 3;
 
@@ -191,10 +191,15 @@ fn wrong_drives_differ() {
 fn wrong_drives_that_the_walk_finds() {
     let walks = all();
     let found = |drive| {
-        let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
+        let of_the_bus = DEVIATIONS
+            .all()
+            .filter(|deviation| !deviation.is_behind_the_bus());
         of_the_bus.filter(|own| finds(&walks, drive, own)).count()
     };
-    assert_eq!((found(2), found(1), deviations().count()), (82, 76, 165));
+    assert_eq!(
+        (found(2), found(1), DEVIATIONS.all().count()),
+        (82, 76, 165)
+    );
 }
 
 /// The values of a property: of a time its border.

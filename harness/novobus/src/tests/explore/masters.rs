@@ -1,7 +1,7 @@
 //! Wrong masters are found by cases made from a seed, and a right one passes them all.
 
 use crate::explore::masters::{case, cases_until_found, input};
-use harness_sim::novobus::deviation::{master_deviation, master_deviations};
+use harness_sim::novobus::deviation::MASTER_DEVIATIONS;
 use harness_sim::novobus::fuzz::jobs::{Work, judged};
 
 #[test]
@@ -21,7 +21,7 @@ fn a_right_master_passes() {
 
 #[test]
 fn every_wrong_master_is_found_soon() {
-    for deviation in master_deviations() {
+    for deviation in MASTER_DEVIATIONS.all() {
         let found = cases_until_found(deviation, 1, 1_000);
         assert!(found.is_some(), "{}", deviation.name);
     }
@@ -36,7 +36,7 @@ fn the_section_is_named() {
         ("names-the-link-behind", "9.7"),
         ("repetition-not-told", "11.5"),
     ] {
-        let deviation = master_deviation(name).expect("a deviation");
+        let deviation = MASTER_DEVIATIONS.named(name).expect("a deviation");
         let (_, lie) = cases_until_found(deviation, 1, 500).expect("found");
         assert_eq!(lie.section, section, "{name}: {lie}");
     }

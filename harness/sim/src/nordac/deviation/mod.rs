@@ -12,6 +12,7 @@ mod sends;
 pub use master::{MASTER_DEVIATIONS, MasterDeviation, MasterLine};
 
 use super::drive::Drive;
+use crate::deviation::{self, DeviationTable};
 use crate::octet_segment::{LineStation, Octet, Wish};
 use harness_proto::line::Received;
 use harness_proto::nordac::{Image, PpoType};
@@ -19,25 +20,14 @@ use harness_proto::profibus::Telegram;
 use harness_proto::time::Instant;
 use parts::{Parts, Reply};
 use reads::{Collector, Raw};
-use std::fmt;
 use std::hash::{Hash as _, Hasher};
 
 /// A way in which a drive breaks the bus standard or the manual.
-pub struct Deviation {
-    /// Its name in files.
-    pub name: &'static str,
-    /// The section that it breaks.
-    pub section: &'static str,
-    /// What such a drive does, in one sentence.
-    pub about: &'static str,
-    how: How,
-}
+pub type Deviation = deviation::Deviation<Injection>;
 
-impl fmt::Debug for Deviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Deviation").field(&self.name).finish()
-    }
-}
+/// How a drive is made to deviate.
+#[derive(Clone, Copy)]
+pub struct Injection(How);
 
 /// Where it deviates.
 #[derive(Clone, Copy)]
@@ -53,18 +43,8 @@ enum How {
 }
 
 /// The deviations of a drive: those of what it reads, of what it hears, and of what it sends.
-pub const DEVIATIONS: [&[Deviation]; 3] = [reads::DEVIATIONS, hears::DEVIATIONS, sends::DEVIATIONS];
-
-/// Every deviation of a drive.
-pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
-    DEVIATIONS.into_iter().flatten()
-}
-
-/// The deviation with this name.
-#[must_use]
-pub fn deviation(name: &str) -> Option<&'static Deviation> {
-    deviations().find(|deviation| deviation.name == name)
-}
+pub static DEVIATIONS: DeviationTable<Injection> =
+    DeviationTable(&[reads::DEVIATIONS, hears::DEVIATIONS, sends::DEVIATIONS]);
 
 /// What a deviant drive remembers.
 #[derive(Clone, Debug, Default)]
@@ -144,7 +124,7 @@ impl Deviant {
     /// Takes an octet that has ended at a time of the line's own clock, when the drive's clock stands at `at`.
     pub fn hear_at(&mut self, at: Instant, ended: Instant, octet: Received) {
         let raw = self.collector.hear(ended, octet);
-        let how = self.deviation.map(|deviation| deviation.how);
+        let how = self.deviation.map(|deviation| deviation.injection.0);
         let telegram = match (self.drive.receive(ended, octet), how, raw) {
             (None, Some(How::Reads(reads)), Some(raw)) if self.drive.is_powered() => {
                 reads(&raw).and_then(|octets| Telegram::decode(&octets).value())
@@ -165,7 +145,7 @@ impl Deviant {
             self.drive.answer(at, telegram);
             return;
         };
-        let how = self.deviation.map(|deviation| deviation.how);
+        let how = self.deviation.map(|deviation| deviation.injection.0);
         let mut heard = request.clone();
         if let Some(How::Hears(hears) | How::Both(hears, _)) = how {
             hears(&self.seen(&request), &mut heard);

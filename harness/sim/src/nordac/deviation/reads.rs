@@ -1,6 +1,7 @@
 //! Drives that read a telegram where there is none (EN 1).
 
-use super::{Deviation, How};
+use super::{Deviation, How, Injection};
+use crate::deviation::rows;
 use crate::nordac::slave::expected;
 use harness_proto::line::{LineError, Received};
 use harness_proto::profibus::BusRate;
@@ -81,18 +82,6 @@ impl Collector {
     }
 }
 
-/// One row a deviation: name, section, what it does, and the octets that the drive reads in place of those on the line.
-macro_rules! reads {
-    ($($name:literal $section:literal $about:literal $how:expr;)+) => {
-        pub(super) const DEVIATIONS: &[Deviation] = &[$(Deviation {
-            name: $name,
-            section: $section,
-            about: $about,
-            how: How::Reads($how),
-        },)+];
-    };
-}
-
 /// The octets with a right FCS.
 fn with_sum(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     let begin = if bytes.first() == Some(&0x68) { 4 } else { 1 };
@@ -107,7 +96,8 @@ fn with(mut bytes: Vec<u8>, place: usize, octet: u8) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-reads! {
+/// A row: name, section, what it does, and the octets that the drive reads in place of those on the line.
+pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Reads):
     "ignores-parity" "EN 1" "An octet with a parity error counts." |raw| raw.with_errors(LineError::Parity);
     "ignores-framing" "EN 1" "An octet with a framing error counts." |raw| raw.with_errors(LineError::Framing);
     "ignores-gaps" "EN 1" "A telegram may have gaps up to T_SYN." |raw| {
@@ -142,4 +132,4 @@ reads! {
         *bytes.get_mut(place)? &= 0x7F;
         with_sum(bytes)
     };
-}
+};

@@ -1,24 +1,14 @@
 //! Drives that send another reply than they should.
 
-use super::{Deviation, How};
+use super::{Deviation, How, Injection};
+use crate::deviation::rows;
 use harness_proto::nordac::Pkw;
 use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::dp::{Diagnosis, Service};
 use harness_proto::profibus::fdl::{FrameControl, Function};
 
-/// One row a deviation: name, section, what it does, and how the reply is changed.
-macro_rules! sends {
-    ($($name:literal $section:literal $about:literal $how:expr;)+) => {
-        pub(super) const DEVIATIONS: &[Deviation] = &[$(Deviation {
-            name: $name,
-            section: $section,
-            about: $about,
-            how: How::Sends($how),
-        },)+];
-    };
-}
-
-sends! {
+/// A row: name, section, what it does, and how the reply is changed.
+pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Sends):
     "wrong-fcs" "EN 1" "FCS of a reply includes its FC twice." |_, r| r.raw(|octets| {
         if let [.., fcs, _] = &mut octets[..] { *fcs = fcs.wrapping_add(8); }
     });
@@ -137,4 +127,4 @@ sends! {
     "answer-is-not-repeated" "3.4.1" "An answer is shown in one exchange only." |s, r| r.inputs(s.ppo(), |image| {
         if image.pkw == s.memory.inputs.pkw { image.pkw = Pkw::default(); }
     });
-}
+};

@@ -1,6 +1,6 @@
 //! Deviations that show only in some cells, values, masks, addresses or repetitions (ND21 9.4, 9.6, 10, 14).
 
-use super::how::{Deviation, How, Moment, Write};
+use super::how::{Deviation, How, Moment, Write, behind_the_bus, wrong};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::{own, ram};
@@ -298,42 +298,33 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
             }
         }),
     ),
-    Deviation {
-        behind_the_bus: true,
-        ..wrong(
-            "eeprom-cells-aliased",
-            "14.10.5",
-            "bit 1 of an EEPROM address is taken for 0",
-            How::Writes(|w| {
-                let address = w.address == ram::EEPROM_BUFFER;
-                Some((w.address, if address { w.data & !2 } else { w.data }))
-            }),
-        )
-    },
-    Deviation {
-        behind_the_bus: true,
-        ..wrong(
-            "eeprom-bit-stuck-at-1",
-            "14.10.5",
-            "bit 4 of every byte that it writes into its EEPROM is 1",
-            How::Writes(|w| {
-                let data = w.address == ram::EEPROM_BUFFER + 1;
-                Some((w.address, if data { w.data | 0x10 } else { w.data }))
-            }),
-        )
-    },
-    Deviation {
-        behind_the_bus: true,
-        ..wrong(
-            "prog-param-copies-nothing",
-            "14.10.5.4",
-            "ProgParam reports at once that it is completed, and copies nothing",
-            How::Writes(|w| {
-                let copies = (w.address, w.data) == (ram::EEPROM_CONTROL, 0x84);
-                Some((w.address, if copies { 0x10 } else { w.data }))
-            }),
-        )
-    },
+    behind_the_bus(
+        "eeprom-cells-aliased",
+        "14.10.5",
+        "bit 1 of an EEPROM address is taken for 0",
+        How::Writes(|w| {
+            let address = w.address == ram::EEPROM_BUFFER;
+            Some((w.address, if address { w.data & !2 } else { w.data }))
+        }),
+    ),
+    behind_the_bus(
+        "eeprom-bit-stuck-at-1",
+        "14.10.5",
+        "bit 4 of every byte that it writes into its EEPROM is 1",
+        How::Writes(|w| {
+            let data = w.address == ram::EEPROM_BUFFER + 1;
+            Some((w.address, if data { w.data | 0x10 } else { w.data }))
+        }),
+    ),
+    behind_the_bus(
+        "prog-param-copies-nothing",
+        "14.10.5.4",
+        "ProgParam reports at once that it is completed, and copies nothing",
+        How::Writes(|w| {
+            let copies = (w.address, w.data) == (ram::EEPROM_CONTROL, 0x84);
+            Some((w.address, if copies { 0x10 } else { w.data }))
+        }),
+    ),
     // Rare events.
     wrong(
         "every-64th-write-lost",
@@ -441,21 +432,6 @@ pub(super) static OF_QUALIFICATIONS: &[Deviation] = &[
         }),
     ),
 ];
-
-const fn wrong(
-    name: &'static str,
-    section: &'static str,
-    about: &'static str,
-    how: How,
-) -> Deviation {
-    Deviation {
-        name,
-        section,
-        about,
-        behind_the_bus: false,
-        how,
-    }
-}
 
 /// Whether it is an address byte to which the drive adds 1 and gets 80.
 fn becomes_80(m: &Moment) -> bool {

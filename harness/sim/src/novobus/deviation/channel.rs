@@ -1,6 +1,6 @@
 //! Deviations in the parameter channel (ND21 9.5, 9.6, 10).
 
-use super::how::{Deviation, How};
+use super::how::{Deviation, How, wrong};
 use harness_proto::nd21::{PARAMETER_COUNT, PARAMETERS};
 use harness_proto::novobus::bus_end::{Parameter, Place};
 use harness_proto::novobus::checksum::Checksum;
@@ -11,52 +11,47 @@ use harness_proto::novobus::output::{Output, OutputChange};
 
 /// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
-    Deviation {
-        name: "checksum-not-checked",
-        section: "9.6",
-        about: "it takes any checking byte for right",
-        behind_the_bus: false,
-        how: How::Hears(|m| match m.check() {
+    wrong(
+        "checksum-not-checked",
+        "9.6",
+        "it takes any checking byte for right",
+        How::Hears(|m| match m.check() {
             Some(right) => m.good(right),
             None => m.received,
         }),
-    },
-    Deviation {
-        name: "checksum-zero-accepted",
-        section: "9.6",
-        about: "it takes 00 as a checking byte",
-        behind_the_bus: false,
-        how: How::Hears(|m| match m.check() {
+    ),
+    wrong(
+        "checksum-zero-accepted",
+        "9.6",
+        "it takes 00 as a checking byte",
+        How::Hears(|m| match m.check() {
             Some(1) if m.received.is(0) => m.good(1),
             _ => m.received,
         }),
-    },
-    Deviation {
-        name: "checksum-wrong",
-        section: "9.6",
-        about: "its checking bytes are one too high",
-        behind_the_bus: false,
-        how: How::Says(|m, byte| {
+    ),
+    wrong(
+        "checksum-wrong",
+        "9.6",
+        "its checking bytes are one too high",
+        How::Says(|m, byte| {
             Some(if m.answers_check().is_some() {
                 byte.wrapping_add(1)
             } else {
                 byte
             })
         }),
-    },
-    Deviation {
-        name: "checksum-not-negated",
-        section: "9.6",
-        about: "its checking byte is the sum of the answer and not the negated one",
-        behind_the_bus: false,
-        how: How::Says(|m, byte| Some(m.answers_check().map_or(byte, Checksum::plus))),
-    },
-    Deviation {
-        name: "checksum-zero-sent",
-        section: "9.6",
-        about: "it sends 00 where its checking byte comes out as 00",
-        behind_the_bus: false,
-        how: How::Says(|m, byte| {
+    ),
+    wrong(
+        "checksum-not-negated",
+        "9.6",
+        "its checking byte is the sum of the answer and not the negated one",
+        How::Says(|m, byte| Some(m.answers_check().map_or(byte, Checksum::plus))),
+    ),
+    wrong(
+        "checksum-zero-sent",
+        "9.6",
+        "it sends 00 where its checking byte comes out as 00",
+        How::Says(|m, byte| {
             Some(
                 if m.answers_check().is_some_and(|sum| sum == Checksum::EMPTY) {
                     0
@@ -65,13 +60,12 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 },
             )
         }),
-    },
-    Deviation {
-        name: "c2-is-read-byte",
-        section: "9.5",
-        about: "it takes the command byte C2, which there is not, for ReadByte",
-        behind_the_bus: false,
-        how: How::Mistakes(
+    ),
+    wrong(
+        "c2-is-read-byte",
+        "9.5",
+        "it takes the command byte C2, which there is not, for ReadByte",
+        How::Mistakes(
             |m| {
                 if m.place == Place::Command && m.received.byte == 0xC2 {
                     m.good(0xC0)
@@ -87,27 +81,24 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 })
             },
         ),
-    },
-    Deviation {
-        name: "read-word-high-first",
-        section: "10.1",
-        about: "it answers ReadWord with the high byte first",
-        behind_the_bus: false,
-        how: How::ReadsFrom(|place, address| reversed(place, Kind::ReadWord, address)),
-    },
-    Deviation {
-        name: "read-long-reversed",
-        section: "10.1",
-        about: "it answers ReadLong with the lowest byte first",
-        behind_the_bus: false,
-        how: How::ReadsFrom(|place, address| reversed(place, Kind::ReadLong, address)),
-    },
-    Deviation {
-        name: "read-long-stops-after-a-word",
-        section: "10.1",
-        about: "its answer to ReadLong has 00 for the last two bytes",
-        behind_the_bus: false,
-        how: How::Says(|m, byte| {
+    ),
+    wrong(
+        "read-word-high-first",
+        "10.1",
+        "it answers ReadWord with the high byte first",
+        How::ReadsFrom(|place, address| reversed(place, Kind::ReadWord, address)),
+    ),
+    wrong(
+        "read-long-reversed",
+        "10.1",
+        "it answers ReadLong with the lowest byte first",
+        How::ReadsFrom(|place, address| reversed(place, Kind::ReadLong, address)),
+    ),
+    wrong(
+        "read-long-stops-after-a-word",
+        "10.1",
+        "its answer to ReadLong has 00 for the last two bytes",
+        How::Says(|m, byte| {
             Some(match m.parameter() {
                 Some(Parameter {
                     kind: Kind::ReadLong,
@@ -117,44 +108,40 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 _ => byte,
             })
         }),
-    },
-    Deviation {
-        name: "reads-anywhere",
-        section: "10.1",
-        about: "it permits reads outside the ranges",
-        behind_the_bus: false,
-        how: How::Permits(|kind, address| kind.reads() || in_range(kind, address)),
-    },
-    Deviation {
-        name: "read-word-end-not-checked",
-        section: "10.1",
-        about: "it permits a word of which only the first byte lies in range",
-        behind_the_bus: false,
-        how: How::Permits(|kind, address| match kind {
+    ),
+    wrong(
+        "reads-anywhere",
+        "10.1",
+        "it permits reads outside the ranges",
+        How::Permits(|kind, address| kind.reads() || in_range(kind, address)),
+    ),
+    wrong(
+        "read-word-end-not-checked",
+        "10.1",
+        "it permits a word of which only the first byte lies in range",
+        How::Permits(|kind, address| match kind {
             Kind::ReadWord => in_range(Kind::ReadByte, address),
             Kind::WriteWord => in_range(Kind::WriteByte, address),
             _ => in_range(kind, address),
         }),
-    },
-    Deviation {
-        name: "fixed-bytes-not-checked",
-        section: "10.1",
-        about: "it takes any byte for the fixed ones of a command",
-        behind_the_bus: false,
-        how: How::Hears(|m| match m.parameter() {
+    ),
+    wrong(
+        "fixed-bytes-not-checked",
+        "10.1",
+        "it takes any byte for the fixed ones of a command",
+        How::Hears(|m| match m.parameter() {
             Some(Parameter {
                 field: Field::Fixed(right),
                 ..
             }) => m.good(right),
             _ => m.received,
         }),
-    },
-    Deviation {
-        name: "writes-before-the-checksum",
-        section: "10.2",
-        about: "it executes WriteByte with the address, before the checking byte",
-        behind_the_bus: false,
-        how: How::Acts(|m, memory| {
+    ),
+    wrong(
+        "writes-before-the-checksum",
+        "10.2",
+        "it executes WriteByte with the address, before the checking byte",
+        How::Acts(|m, memory| {
             if let Some(Parameter {
                 kind: Kind::WriteByte,
                 field: Field::AddrH,
@@ -168,38 +155,32 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 memory.write(u16::from_be_bytes([m.received.byte, low]), data[0]);
             }
         }),
-    },
-    Deviation {
-        name: "write-word-swapped",
-        section: "10.2",
-        about: "it writes the bytes of WriteWord in the wrong order",
-        behind_the_bus: false,
-        how: How::Writes(|w| Some((reversed(w.place, Kind::WriteWord, w.address), w.data))),
-    },
-    Deviation {
-        name: "write-rom-permitted",
-        section: "10.2",
-        about: "it accepts writes outside the RAM, without effect",
-        behind_the_bus: false,
-        how: How::Permits(|kind, address| {
+    ),
+    wrong(
+        "write-word-swapped",
+        "10.2",
+        "it writes the bytes of WriteWord in the wrong order",
+        How::Writes(|w| Some((reversed(w.place, Kind::WriteWord, w.address), w.data))),
+    ),
+    wrong(
+        "write-rom-permitted",
+        "10.2",
+        "it accepts writes outside the RAM, without effect",
+        How::Permits(|kind, address| {
             matches!(kind, Kind::WriteByte | Kind::WriteWord) || in_range(kind, address)
         }),
-    },
-    Deviation {
-        name: "writes-ignored",
-        section: "10.2",
-        about: "it answers WriteByte and does not write",
-        behind_the_bus: false,
-        how: How::Writes(|w| {
-            (kind(w.place) != Some(Kind::WriteByte)).then_some((w.address, w.data))
-        }),
-    },
-    Deviation {
-        name: "and-is-or",
-        section: "10.3",
-        about: "it does Or where And is asked for",
-        behind_the_bus: false,
-        how: How::Writes(|w| {
+    ),
+    wrong(
+        "writes-ignored",
+        "10.2",
+        "it answers WriteByte and does not write",
+        How::Writes(|w| (kind(w.place) != Some(Kind::WriteByte)).then_some((w.address, w.data))),
+    ),
+    wrong(
+        "and-is-or",
+        "10.3",
+        "it does Or where And is asked for",
+        How::Writes(|w| {
             Some((
                 w.address,
                 match w.place {
@@ -208,13 +189,12 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 },
             ))
         }),
-    },
-    Deviation {
-        name: "or-is-write",
-        section: "10.3",
-        about: "it writes the mask where Or is asked for",
-        behind_the_bus: false,
-        how: How::Writes(|w| {
+    ),
+    wrong(
+        "or-is-write",
+        "10.3",
+        "it writes the mask where Or is asked for",
+        How::Writes(|w| {
             Some((
                 w.address,
                 match w.place {
@@ -223,22 +203,20 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 },
             ))
         }),
-    },
-    Deviation {
-        name: "bits-beyond-the-ram",
-        section: "10.3",
-        about: "it permits And and Or above FF7F",
-        behind_the_bus: false,
-        how: How::Permits(|kind, address| {
+    ),
+    wrong(
+        "bits-beyond-the-ram",
+        "10.3",
+        "it permits And and Or above FF7F",
+        How::Permits(|kind, address| {
             matches!(kind, Kind::And | Kind::Or) || in_range(kind, address)
         }),
-    },
-    Deviation {
-        name: "outputs-exchanged",
-        section: "10.4",
-        about: "WriteIO of GPO1 changes GPO2, and the other way round",
-        behind_the_bus: false,
-        how: How::Outputs(|change| {
+    ),
+    wrong(
+        "outputs-exchanged",
+        "10.4",
+        "WriteIO of GPO1 changes GPO2, and the other way round",
+        How::Outputs(|change| {
             Some(OutputChange {
                 output: match change.output {
                     Output::Gpo1 => Output::Gpo2,
@@ -247,45 +225,41 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 ..change
             })
         }),
-    },
-    Deviation {
-        name: "outputs-inverted",
-        section: "10.4",
-        about: "WriteIO clears what it is to set and sets what it is to clear",
-        behind_the_bus: false,
-        how: How::Outputs(|change| {
+    ),
+    wrong(
+        "outputs-inverted",
+        "10.4",
+        "WriteIO clears what it is to set and sets what it is to clear",
+        How::Outputs(|change| {
             Some(OutputChange {
                 set: !change.set,
                 ..change
             })
         }),
-    },
-    Deviation {
-        name: "write-io-any-code",
-        section: "10.4",
-        about: "it takes codes above 03 for those of their two lowest bits",
-        behind_the_bus: false,
-        how: How::Hears(|m| match m.parameter() {
+    ),
+    wrong(
+        "write-io-any-code",
+        "10.4",
+        "it takes codes above 03 for those of their two lowest bits",
+        How::Hears(|m| match m.parameter() {
             Some(Parameter {
                 field: Field::Code, ..
             }) => m.good(m.received.byte & 3),
             _ => m.received,
         }),
-    },
-    Deviation {
-        name: "reset-ignored",
-        section: "10.5",
-        about: "it answers ResetH8 and keeps its memory",
-        behind_the_bus: false,
-        how: How::Resets(|_| ()),
-    },
-    Deviation {
-        name: "reset-keeps-parameters",
-        section: "10.5",
-        about: "its parameters are not loaded from the EEPROM at a reset",
-        behind_the_bus: false,
-        how: How::Resets(keep_parameters),
-    },
+    ),
+    wrong(
+        "reset-ignored",
+        "10.5",
+        "it answers ResetH8 and keeps its memory",
+        How::Resets(|_| ()),
+    ),
+    wrong(
+        "reset-keeps-parameters",
+        "10.5",
+        "its parameters are not loaded from the EEPROM at a reset",
+        How::Resets(keep_parameters),
+    ),
 ];
 
 fn kind(place: Place) -> Option<Kind> {

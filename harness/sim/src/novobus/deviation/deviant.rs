@@ -73,7 +73,7 @@ impl Deviant {
     fn amend(&mut self) {
         let (bus_end, _) = self.drive.parts();
         for deviation in &self.deviations {
-            if let How::Amends(amend) = deviation.how {
+            if let How::Amends(amend) = deviation.injection.how {
                 bus_end.amend(amend);
             }
         }
@@ -103,7 +103,7 @@ impl Deviant {
     fn heard(&self, moment: &Moment) -> Received {
         let mut moment = *moment;
         for deviation in &self.deviations {
-            if let How::Hears(hears) | How::Mistakes(hears, _) = deviation.how {
+            if let How::Hears(hears) | How::Mistakes(hears, _) = deviation.injection.how {
                 moment.received = hears(&moment);
             }
         }
@@ -115,11 +115,11 @@ impl Deviant {
         let mut twice = false;
         let mut byte = moment.step.byte;
         for deviation in &self.deviations {
-            byte = match (&deviation.how, byte) {
+            byte = match (&deviation.injection.how, byte) {
                 (How::Says(says) | How::Mistakes(_, says), Some(byte)) => says(moment, byte),
                 _ => byte,
             };
-            if let How::Repeats(repeats) = deviation.how {
+            if let How::Repeats(repeats) = deviation.injection.how {
                 twice |= repeats(moment);
             }
         }
@@ -128,7 +128,7 @@ impl Deviant {
 
     fn act(&mut self, moment: &Moment) {
         for i in 0..self.deviations.len() {
-            match self.deviations[i].how {
+            match self.deviations[i].injection.how {
                 How::Acts(acts) => {
                     acts(moment, self.drive.parts().1);
                     self.drive.bus_has_worked();
@@ -165,7 +165,7 @@ impl Deviant {
     /// What it says after a look at its cells.
     fn told(&mut self, moment: &Moment, mut byte: Option<u8>) -> Option<u8> {
         for deviation in &self.deviations {
-            if let (How::Tells(tells), Some(said)) = (&deviation.how, byte) {
+            if let (How::Tells(tells), Some(said)) = (&deviation.injection.how, byte) {
                 byte = Some(tells(moment, self.drive.parts().1, said));
             }
         }
@@ -180,7 +180,7 @@ impl Deviant {
         twice: bool,
         moment: Option<&Moment>,
     ) -> Option<u8> {
-        let late = self.deviations.iter().find_map(|d| match d.how {
+        let late = self.deviations.iter().find_map(|d| match d.injection.how {
             How::Late(late) => Some(late),
             How::LateAt(late) => moment.and_then(late),
             _ => None,
@@ -204,7 +204,7 @@ impl Deviant {
     fn hold(&mut self) -> Vec<(u16, bool, u16, u16)> {
         let mut kept = Vec::new();
         for deviation in &self.deviations {
-            let How::Holds(held) = deviation.how else {
+            let How::Holds(held) = deviation.injection.how else {
                 continue;
             };
             let cells = self.drive.cells_mut();
@@ -266,7 +266,10 @@ impl Device for Deviant {
             step: Reaction::default(),
         };
         let heard = self.heard(&moment);
-        let keeps = self.deviations.iter().any(|d| matches!(d.how, How::Keeps));
+        let keeps = self
+            .deviations
+            .iter()
+            .any(|d| matches!(d.injection.how, How::Keeps));
         let before = keeps.then(|| Box::new(self.drive.parts().0.clone()));
         moment.step = self.with(moment.place, |bus_end, memory| {
             bus_end.receive(now, heard, memory)
@@ -289,7 +292,7 @@ impl Device for Deviant {
             !self
                 .deviations
                 .iter()
-                .any(|d| matches!(d.how, How::Waits(waits) if waits(*due)))
+                .any(|d| matches!(d.injection.how, How::Waits(waits) if waits(*due)))
         };
         let (bus_end, memory) = self.drive.inside();
         let monitored = || monitors(&self.deviations).unwrap_or_else(|| memory.monitors_time_out());
@@ -362,7 +365,7 @@ impl Device for Deviant {
     }
 
     fn head_start(&self) -> Span {
-        let early = self.deviations.iter().find_map(|d| match d.how {
+        let early = self.deviations.iter().find_map(|d| match d.injection.how {
             How::Early(early) => Some(early),
             _ => None,
         });

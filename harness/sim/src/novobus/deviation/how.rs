@@ -1,6 +1,7 @@
 //! What a deviation is, and the ways to inject one.
 
 use super::{behind, cells, channel, errors, numbered, recovery, telegram};
+use crate::deviation::{self, DeviationTable};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Reaction};
 use harness_proto::novobus::checksum::Checksum;
@@ -12,52 +13,87 @@ use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::novobus::sync::SyncByte;
 use harness_proto::time::Span;
-use std::fmt;
 
 /// A way in which a drive breaks the manual.
-pub struct Deviation {
-    /// Its name in files: `sends-16-zeros`.
-    pub name: &'static str,
-    /// The section of the ND21's manual that it breaks: `9.7`.
-    pub section: &'static str,
-    /// What such a drive does, in one sentence.
-    pub about: &'static str,
-    /// Only a drive of the model `nd21` can deviate so: a plain one has nothing behind its bus.
-    pub behind_the_bus: bool,
+pub type Deviation = deviation::Deviation<Injection>;
+
+/// How a drive is made to deviate.
+pub struct Injection {
+    behind_the_bus: bool,
     pub(super) how: How,
 }
 
-impl fmt::Debug for Deviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Deviation").field(&self.name).finish()
+impl Deviation {
+    /// Whether only a drive of the model `nd21` can deviate so: a plain one has nothing behind its bus.
+    #[must_use]
+    pub const fn is_behind_the_bus(&self) -> bool {
+        self.injection.behind_the_bus
     }
 }
 
-/// All of them: first those of the bus end, then those of the drive behind it.
-pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
-    let tables = [
-        telegram::DEVIATIONS,
-        channel::DEVIATIONS,
-        errors::DEVIATIONS,
-        recovery::DEVIATIONS,
-        cells::DEVIATIONS,
-        behind::DEVIATIONS,
-    ];
-    tables.into_iter().flatten()
+/// A deviation that any drive can have.
+pub(super) const fn wrong(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    how: How,
+) -> Deviation {
+    let behind_the_bus = false;
+    Deviation::new(
+        name,
+        section,
+        about,
+        Injection {
+            behind_the_bus,
+            how,
+        },
+    )
 }
+
+/// A deviation that only a drive of the model `nd21` can have.
+pub(super) const fn behind_the_bus(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    how: How,
+) -> Deviation {
+    let behind_the_bus = true;
+    Deviation::new(
+        name,
+        section,
+        about,
+        Injection {
+            behind_the_bus,
+            how,
+        },
+    )
+}
+
+/// All of them: first those of the bus end, then those of the drive behind it.
+pub static DEVIATIONS: DeviationTable<Injection> = DeviationTable(&[
+    telegram::DEVIATIONS,
+    channel::DEVIATIONS,
+    errors::DEVIATIONS,
+    recovery::DEVIATIONS,
+    cells::DEVIATIONS,
+    behind::DEVIATIONS,
+]);
 
 /// Relatives of these with other numbers, and deviations that only a qualification shows. They can be planted and are looked for like all
 /// others, and no list shows them.
-pub fn relatives() -> impl Iterator<Item = &'static Deviation> {
-    numbered::numbered_ones().chain(cells::OF_QUALIFICATIONS)
-}
+pub static RELATIVES: DeviationTable<Injection> = DeviationTable(&[
+    numbered::COUNTS,
+    numbered::SENDS,
+    numbered::ADDS,
+    numbered::INCREMENTS,
+    cells::OF_QUALIFICATIONS,
+]);
 
 /// The deviation of this name, the relatives among them.
 #[must_use]
 pub fn deviation(name: &str) -> Option<&'static Deviation> {
-    deviations()
-        .chain(relatives())
-        .find(|deviation| deviation.name == name)
+    let known = DEVIATIONS.named(name);
+    known.or_else(|| RELATIVES.named(name))
 }
 
 /// A byte under consideration.

@@ -3,9 +3,9 @@
 //! A [`Deviant`] wraps a right drive and is the only place that injects deviations. It changes incoming bytes before the
 //! drive's bus end receives them, outgoing bytes after it, accesses of the bus end to the
 //! memory, and the values that the drive's program finds in its cells. The inner drive is unchanged.
-//! [`deviations`] is the table: a name, a sentence, the section that is broken, and the injection.
+//! [`DEVIATIONS`] is the table: a name, a sentence, the section that is broken, and the injection.
 //!
-//! [`DeviantMaster`] and [`master_deviations`] do the same for the bench's own master.
+//! [`DeviantMaster`] and [`MASTER_DEVIATIONS`] do the same for the bench's own master.
 
 mod behind;
 mod cells;
@@ -20,5 +20,5 @@ mod recovery;
 mod telegram;
 
 pub use deviant::Deviant;
-pub use how::{Deviation, deviation, deviations, relatives};
-pub use master::{DeviantMaster, MasterDeviation, master_deviation, master_deviations};
+pub use how::{DEVIATIONS, Deviation, RELATIVES, deviation};
+pub use master::{DeviantMaster, MASTER_DEVIATIONS, MasterDeviation};

@@ -1,7 +1,7 @@
 //! The numbers of the error mode (ND21 9.7) put wrong in any way: relatives of deviations in the tables, which stand there with one number
 //! each.
 
-use super::how::{Deviation, How};
+use super::how::{Deviation, How, wrong};
 
 /// Drives that take `n` zeros in a row for the sign that the preceding drive is in the error mode.
 macro_rules! counts {
@@ -40,23 +40,18 @@ macro_rules! adds {
 }
 
 const fn numbered(name: &'static str, about: &'static str, how: How) -> Deviation {
-    Deviation {
-        name,
-        section: "9.7",
-        about,
-        behind_the_bus: false,
-        how,
-    }
+    wrong(name, "9.7", about, how)
 }
 
-static COUNTS: &[Deviation] = counts!(1 2 3 4 5 6 10 11 12 13 14 15 16 17 18 20 24 25 32);
+pub(super) static COUNTS: &[Deviation] =
+    counts!(1 2 3 4 5 6 10 11 12 13 14 15 16 17 18 20 24 25 32);
 
-static SENDS: &[Deviation] =
+pub(super) static SENDS: &[Deviation] =
     sends!(1 2 4 7 8 9 10 11 12 13 14 15 19 20 21 22 23 24 25 26 28 30 32 34 40 50 64);
 
-static ADDS: &[Deviation] = adds!(0 3 4 8 16 32 64 128 254 255);
+pub(super) static ADDS: &[Deviation] = adds!(0 3 4 8 16 32 64 128 254 255);
 
-static INCREMENTS: &[Deviation] = &[
+pub(super) static INCREMENTS: &[Deviation] = &[
     numbered(
         "increments-seven-bits-in-error-mode",
         "it leaves bit 7 out where it adds 1 in the error mode",
@@ -98,8 +93,3 @@ static INCREMENTS: &[Deviation] = &[
         }),
     ),
 ];
-
-/// All of them.
-pub(super) fn numbered_ones() -> impl Iterator<Item = &'static Deviation> {
-    [COUNTS, SENDS, ADDS, INCREMENTS].into_iter().flatten()
-}

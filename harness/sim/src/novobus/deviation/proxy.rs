@@ -30,14 +30,14 @@ impl Memory for Proxy<'_> {
     fn read(&mut self, address: u16) -> u8 {
         let mut from = address;
         for deviation in self.deviations {
-            if let How::ReadsFrom(other) = deviation.how {
+            if let How::ReadsFrom(other) = deviation.injection.how {
                 from = other(self.place, from);
             }
         }
         let mut data = seen(self.deviations, &mut |a| self.memory.read(a), from);
         for deviation in self.deviations {
             if let (How::Misreads(other), Place::Parameter(Parameter { kind, .. })) =
-                (&deviation.how, self.place)
+                (&deviation.injection.how, self.place)
                 && kind.reads()
             {
                 data = other(self.counts.reads + 1, address, data);
@@ -57,7 +57,7 @@ impl Memory for Proxy<'_> {
             nth: self.counts.writes + 1,
         };
         for deviation in self.deviations {
-            if let How::Writes(other) = deviation.how {
+            if let How::Writes(other) = deviation.injection.how {
                 let Some((address, data)) = other(write) else {
                     return;
                 };
@@ -73,7 +73,7 @@ impl Memory for Proxy<'_> {
 
     fn permits(&self, kind: Kind, address: u16) -> bool {
         let right = self.memory.permits(kind, address);
-        let differs = |d: &&Deviation| match d.how {
+        let differs = |d: &&Deviation| match d.injection.how {
             How::Permits(permits) => permits(kind, address) != right,
             _ => false,
         };
@@ -84,7 +84,7 @@ impl Memory for Proxy<'_> {
         let changed = self
             .deviations
             .iter()
-            .try_fold(change, |change, d| match d.how {
+            .try_fold(change, |change, d| match d.injection.how {
                 How::Outputs(other) => other(change),
                 _ => Some(change),
             });
@@ -94,7 +94,7 @@ impl Memory for Proxy<'_> {
     }
 
     fn reset(&mut self) {
-        let other = self.deviations.iter().find_map(|d| match d.how {
+        let other = self.deviations.iter().find_map(|d| match d.injection.how {
             How::Resets(reset) => Some(reset),
             _ => None,
         });
@@ -108,7 +108,7 @@ impl Memory for Proxy<'_> {
         let reported = self
             .deviations
             .iter()
-            .try_fold(error, |error, d| match d.how {
+            .try_fold(error, |error, d| match d.injection.how {
                 How::Reports(other) => other(error),
                 _ => Some(error),
             });
@@ -124,7 +124,7 @@ impl Memory for Proxy<'_> {
 
 /// Whether time-outs are monitored, where a deviation decides it.
 pub(super) fn monitors(deviations: &[&'static Deviation]) -> Option<bool> {
-    deviations.iter().find_map(|d| match d.how {
+    deviations.iter().find_map(|d| match d.injection.how {
         How::Monitors(on) => Some(on),
         _ => None,
     })
@@ -139,7 +139,7 @@ pub(super) fn seen(
     let Some((last, before)) = deviations.split_last() else {
         return peek(address);
     };
-    match last.how {
+    match last.injection.how {
         How::Reads(reads) => reads(&mut |a| seen(before, peek, a), address),
         _ => seen(before, peek, address),
     }

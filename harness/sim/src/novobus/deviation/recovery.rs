@@ -1,7 +1,7 @@
 //! Deviations in what a drive does with the byte in error, with the zeros behind it and with a check sequence that
 //! breaks off (ND21 9.7, 9.8).
 
-use super::how::{Deviation, How, Moment};
+use super::how::{Deviation, How, Moment, wrong};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::bus_end::Place;
 use harness_proto::novobus::check_sequence::SEQUENCE;
@@ -176,21 +176,6 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         }),
     ),
 ];
-
-const fn wrong(
-    name: &'static str,
-    section: &'static str,
-    about: &'static str,
-    how: How,
-) -> Deviation {
-    Deviation {
-        name,
-        section,
-        about,
-        behind_the_bus: false,
-        how,
-    }
-}
 
 /// One kind of byte in error is passed on; the zeros begin with the next byte.
 const fn passes(

@@ -1,24 +1,14 @@
 //! Drives that read something else out of frames than the manual says.
 
-use super::{Deviation, Hearing, How};
+use super::{Deviation, Hearing, How, Injection};
+use crate::deviation::rows;
 use harness_proto::can::{Frame, Id};
 use harness_proto::unitek::frame::STOP;
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Access, Data, Register, Request};
 
-/// One row a deviation: name, section, what it does, and the frames that the drive hears in place of one.
-macro_rules! hears {
-    ($($name:literal $section:literal $about:literal $how:expr;)+) => {
-        pub(super) const DEVIATIONS: &[Deviation] = &[$(Deviation {
-            name: $name,
-            section: $section,
-            about: $about,
-            how: How::Hears($how),
-        },)+];
-    };
-}
-
-hears! {
+/// A row: name, section, what it does, and the frames that the drive hears in place of one.
+pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Hears):
     "answers-remote-frames" "4.4" "A remote frame is answered with STATUS." |h| {
         if h.frame.is_remote() {
             h.instead(Request::Read { register: 0x40 })
@@ -182,7 +172,7 @@ hears! {
     "eeprom-levels-swapped" "ex 7" "Level 0 is stored as level 1, and level 1 as level 0." |h| h.writing(0x84, |level| level ^ 1);
     "errors-stay" "dump" "FUN_ERRCANCEL clears nothing." |h| h.without_writes(0x8E);
     "no-time-out" "ex 1" "T-Out is not supervised." |h| h.writing(0xD0, |_| 0);
-}
+};
 
 /// A stop for every cycle that runs.
 fn stops(h: &Hearing<'_>) -> Vec<Frame> {

@@ -12,31 +12,21 @@ pub use master::{DeviantMaster, MASTER_DEVIATIONS, MasterDeviation};
 
 use super::drive::Drive;
 use super::outbox::Waiting;
+use crate::deviation::{self, DeviationTable};
 use crate::segment::Station;
 use harness_proto::can::Frame;
 use harness_proto::time::Instant;
 use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::{Data, Reply, Request};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 /// A way in which a drive breaks the manual.
-pub struct Deviation {
-    /// Its name in files.
-    pub name: &'static str,
-    /// The section, example or appendix item that it breaks.
-    pub section: &'static str,
-    /// What such a drive does, in one sentence.
-    pub about: &'static str,
-    how: How,
-}
+pub type Deviation = deviation::Deviation<Injection>;
 
-impl fmt::Debug for Deviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Deviation").field(&self.name).finish()
-    }
-}
+/// How a drive is made to deviate.
+#[derive(Clone, Copy)]
+pub struct Injection(How);
 
 /// Where it deviates.
 #[derive(Clone, Copy)]
@@ -48,18 +38,8 @@ enum How {
 }
 
 /// The deviations of a drive: those of what it hears, then those of what it sends.
-pub const DEVIATIONS: [&[Deviation]; 2] = [hears::DEVIATIONS, sends::DEVIATIONS];
-
-/// Every deviation of a drive.
-pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
-    DEVIATIONS.into_iter().flatten()
-}
-
-/// The deviation with this name.
-#[must_use]
-pub fn deviation(name: &str) -> Option<&'static Deviation> {
-    deviations().find(|deviation| deviation.name == name)
-}
+pub static DEVIATIONS: DeviationTable<Injection> =
+    DeviationTable(&[hears::DEVIATIONS, sends::DEVIATIONS]);
 
 /// Those that depend on how many frames were heard and sent before, and the one that depends on what was first sent.
 const COUNTING: [&str; 2] = ["loses-each-fifth-frame", "loses-each-fifth-reply"];
@@ -255,7 +235,7 @@ impl Deviant {
         let waiting = self.drive.wants()?;
         let tx = self.drive.identifiers().1;
         let frames = match (
-            self.deviation.map(|d| d.how),
+            self.deviation.map(|deviation| deviation.injection.0),
             Reply::decode(&waiting.frame, tx),
         ) {
             (Some(How::Sends(sends)), Ok(reply)) => sends(&Sending {
@@ -302,7 +282,7 @@ impl Station for Deviant {
     fn hear(&mut self, at: Instant, frame: &Frame) {
         self.memory.heard += 1;
         let rx = self.drive.identifiers().0;
-        let frames = match self.deviation.map(|deviation| deviation.how) {
+        let frames = match self.deviation.map(|deviation| deviation.injection.0) {
             Some(How::Hears(hears)) => {
                 self.drive.advance(at);
                 hears(&Hearing {

@@ -1,25 +1,15 @@
 //! Drives that send something else than the manual says.
 
-use super::{Deviation, How};
+use super::{Deviation, How, Injection};
+use crate::deviation::rows;
 use crate::unitek::Cause;
 use harness_proto::can::Frame;
 use harness_proto::unitek::frame::{DEFAULT_RX, READ};
 use harness_proto::unitek::words::status;
 use harness_proto::unitek::{Data, Reply};
 
-/// One row a deviation: name, section, what it does, and the frames that the drive sends in place of one.
-macro_rules! sends {
-    ($($name:literal $section:literal $about:literal $how:expr;)+) => {
-        pub(super) const DEVIATIONS: &[Deviation] = &[$(Deviation {
-            name: $name,
-            section: $section,
-            about: $about,
-            how: How::Sends($how),
-        },)+];
-    };
-}
-
-sends! {
+/// A row: name, section, what it does, and the frames that the drive sends in place of one.
+pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Sends):
     "no-stuff-byte" "4.5" "A reply ends with its data: 3 or 5 bytes." |s| s.bytes(|bytes| bytes[..bytes.len() - 1].to_vec());
     "eight-bytes" "4.5" "A reply always has 8 bytes." |s| s.bytes(|bytes| {
         let mut bytes = bytes.to_vec();
@@ -82,4 +72,4 @@ sends! {
         let unassigned = harness_proto::unitek::Register::of(s.reply.register).dump == 0xFACE;
         s.contents(|bits| if unassigned { 0 } else { bits })
     };
-}
+};

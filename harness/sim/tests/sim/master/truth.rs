@@ -1,7 +1,7 @@
 //! The judge of jobs (`fuzz::jobs`): a right master never lies, and every wrong one is found by the body of the fuzz target.
 
 use super::common::{Random, repeat, seed};
-use harness_sim::novobus::deviation::master_deviations;
+use harness_sim::novobus::deviation::MASTER_DEVIATIONS;
 use harness_sim::novobus::fuzz::jobs::{Work, judged};
 
 /// Cases of the right master; `CASES` asks for more.
@@ -33,7 +33,7 @@ fn a_right_master_never_lies() {
 #[test]
 fn every_wrong_master_is_found() {
     let mut unseen = Vec::new();
-    for deviation in master_deviations() {
+    for deviation in MASTER_DEVIATIONS.all() {
         let lies = |case: u64| judged(&Work::read(&input(case)), Some(deviation)).is_some();
         if !(0..WRONG).any(lies) {
             unseen.push(deviation.name);

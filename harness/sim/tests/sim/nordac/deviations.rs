@@ -6,9 +6,7 @@ use harness_proto::profibus::BusRate;
 use harness_proto::profibus::fdl::FrameControl;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
-use harness_sim::nordac::deviation::{
-    DEVIATIONS, Deviant, Deviation, MASTER_DEVIATIONS, MasterDeviation, deviation, deviations,
-};
+use harness_sim::nordac::deviation::{DEVIATIONS, Deviant, Deviation, MASTER_DEVIATIONS};
 use harness_sim::nordac::{Drive, InverterSetup};
 use harness_sim::octet_segment::{LineStation, Octet, Wish};
 use harness_sim::record::LineByte;
@@ -369,22 +367,23 @@ fn with(deviation: Option<&'static Deviation>) -> Vec<LineByte> {
 /// Names are unique, and there are at least 50 deviations of the drive and 15 of the master.
 #[test]
 fn the_tables() {
-    let names: BTreeSet<_> = deviations().map(|d| d.name).collect();
-    let count = DEVIATIONS.iter().map(|table| table.len()).sum::<usize>();
+    let names = BTreeSet::from_iter(DEVIATIONS.names());
+    let count = DEVIATIONS.all().count();
     assert_eq!(names.len(), count);
     assert!(count >= 50, "{count}");
-    let masters: BTreeSet<_> = MASTER_DEVIATIONS.iter().map(|d| d.name).collect();
-    assert!(masters.len() == MASTER_DEVIATIONS.len() && masters.len() >= 15);
-    for (name, about) in deviations()
+    let masters = BTreeSet::from_iter(MASTER_DEVIATIONS.names());
+    assert!(masters.len() == MASTER_DEVIATIONS.all().count() && masters.len() >= 15);
+    for (name, about) in DEVIATIONS
+        .all()
         .map(|d| (d.name, d.about))
-        .chain(MASTER_DEVIATIONS.iter().map(|d| (d.name, d.about)))
+        .chain(MASTER_DEVIATIONS.all().map(|d| (d.name, d.about)))
     {
         let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
         assert!(name.bytes().all(plain), "{name}");
         assert!(about.ends_with('.') && about.len() < 120, "{name}: {about}");
     }
-    assert!(deviation("no-off2").is_some() && deviation("none").is_none());
-    assert!(MasterDeviation::of("master-gaps").is_some());
+    assert!(DEVIATIONS.named("no-off2").is_some() && DEVIATIONS.named("none").is_none());
+    assert!(MASTER_DEVIATIONS.named("master-gaps").is_some());
 }
 
 #[test]
@@ -392,7 +391,8 @@ fn each_deviation_of_the_drive_shows() {
     let right = right();
     assert!(right.len() > 2_000, "{}", right.len());
     assert!(with(None) == right, "a wrapper without a deviation");
-    let hidden: Vec<_> = deviations()
+    let hidden: Vec<_> = DEVIATIONS
+        .all()
         .filter(|d| with(Some(d)) == right)
         .map(|d| d.name)
         .collect();

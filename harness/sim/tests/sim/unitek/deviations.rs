@@ -8,8 +8,7 @@ use harness_proto::unitek::master::{Event, Job, Options, Outcome};
 use harness_proto::unitek::properties::Properties;
 use harness_sim::segment::{Host, Segment, Station};
 use harness_sim::unitek::deviation::{
-    DEVIATIONS, Deviant, DeviantMaster, Deviation, MASTER_DEVIATIONS, MasterDeviation, deviation,
-    deviations,
+    DEVIATIONS, Deviant, DeviantMaster, Deviation, MASTER_DEVIATIONS, MasterDeviation,
 };
 use harness_sim::unitek::{Drive, Inputs};
 use std::collections::BTreeSet;
@@ -85,17 +84,15 @@ fn with(deviation: Option<&'static Deviation>) -> Vec<(u64, Frame)> {
 /// Names are unique, and there are at least 40 deviations of the drive and 15 of the master.
 #[test]
 fn the_tables() {
-    let names: BTreeSet<_> = deviations().map(|d| d.name).collect();
-    assert_eq!(
-        names.len(),
-        DEVIATIONS.iter().map(|table| table.len()).sum::<usize>()
-    );
+    let names = BTreeSet::from_iter(DEVIATIONS.names());
+    assert_eq!(names.len(), DEVIATIONS.all().count());
     assert!(names.len() >= 40, "{}", names.len());
-    let masters: BTreeSet<_> = MASTER_DEVIATIONS.iter().map(|d| d.name).collect();
-    assert!(masters.len() == MASTER_DEVIATIONS.len() && masters.len() >= 15);
-    for (name, about) in deviations()
+    let masters = BTreeSet::from_iter(MASTER_DEVIATIONS.names());
+    assert!(masters.len() == MASTER_DEVIATIONS.all().count() && masters.len() >= 15);
+    for (name, about) in DEVIATIONS
+        .all()
         .map(|d| (d.name, d.about))
-        .chain(MASTER_DEVIATIONS.iter().map(|d| (d.name, d.about)))
+        .chain(MASTER_DEVIATIONS.all().map(|d| (d.name, d.about)))
     {
         assert!(
             name.bytes()
@@ -104,7 +101,7 @@ fn the_tables() {
         );
         assert!(about.ends_with('.') && about.len() < 120, "{name}: {about}");
     }
-    assert!(deviation("no-lock").is_some() && deviation("none").is_none());
+    assert!(DEVIATIONS.named("no-lock").is_some() && DEVIATIONS.named("none").is_none());
 }
 
 #[test]
@@ -112,7 +109,8 @@ fn each_deviation_of_the_drive_shows() {
     let right = conversation(drive(), switch);
     assert!(right.len() > 80, "{}", right.len());
     assert_eq!(with(None), right, "a wrapper without a deviation");
-    let hidden: Vec<_> = deviations()
+    let hidden: Vec<_> = DEVIATIONS
+        .all()
         .filter(|d| with(Some(d)) == right)
         .map(|d| d.name)
         .collect();
@@ -213,7 +211,7 @@ fn each_deviation_of_the_master_shows() {
         right.1
     );
     let hidden: Vec<_> = MASTER_DEVIATIONS
-        .iter()
+        .all()
         .filter(|d| jobs(Some(d)) == right)
         .map(|d| d.name)
         .collect();

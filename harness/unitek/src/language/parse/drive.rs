@@ -9,7 +9,7 @@ use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::times;
 use harness_proto::unitek::properties::{Accepts, Description, PROFILES, PROPERTIES};
-use harness_sim::unitek::deviation::{Deviation, deviations};
+use harness_sim::unitek::deviation::DEVIATIONS;
 use harness_sim::unitek::{Control, Inputs};
 
 pub(super) enum DriveLine {
@@ -80,10 +80,8 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, DriveLine), Pr
         Word::Property => DriveLine::Setup(property(scanner)?),
         Word::Mode => DriveLine::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
         Word::Deviates => {
-            let names = deviations().map(|wrong| (wrong.name, wrong));
-            let names: Vec<(&str, &'static Deviation)> = names.collect();
-            let deviant = deviation(scanner, &names, "a drive", "`drive 1 deviates NAME`")?;
-            DriveLine::Setup(SetupKind::Deviates(deviant))
+            let known = deviation(scanner, &DEVIATIONS, "a drive", "`drive 1 deviates NAME`")?;
+            DriveLine::Setup(SetupKind::Deviates(known))
         }
         Word::Register => {
             let register = value::register(scanner)?;

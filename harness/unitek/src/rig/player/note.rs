@@ -20,7 +20,7 @@ use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{Access, REGISTERS, Register, Request};
-use harness_sim::unitek::deviation::{Deviation, deviations};
+use harness_sim::unitek::deviation::{DEVIATIONS, Deviation};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -266,7 +266,7 @@ impl Note for DriveNote {
     type Deviation = Deviation;
 
     fn deviations() -> Vec<&'static Deviation> {
-        deviations().collect()
+        DEVIATIONS.all().collect()
     }
 
     fn words(deviation: &Deviation) -> String {

@@ -7,7 +7,7 @@ use crate::rig::RigSlave;
 use harness_bench::scenario::source::Source;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::Limits;
-use harness_sim::nordac::deviation::deviation;
+use harness_sim::nordac::deviation::DEVIATIONS;
 use std::sync::Arc;
 
 /// Up to 25 % in 1.25 s, down by OFF3, a fault by 1625, and a parameter that follows the motor.
@@ -180,7 +180,7 @@ fn deviations_are_found_without_a_line() {
         "answers-without-number",
         "pzd-low-byte-first",
     ] {
-        let deviation = deviation(name);
+        let deviation = DEVIATIONS.named(name);
         assert!(deviation.is_some(), "{name}");
         let mut slave = known(&[]).model(Default::default());
         slave.deviation = deviation;

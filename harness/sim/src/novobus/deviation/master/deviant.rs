@@ -47,7 +47,7 @@ impl DeviantMaster {
         options: MasterOptions,
         deviation: &'static MasterDeviation,
     ) -> Self {
-        let options = match deviation.how {
+        let options = match deviation.injection.0 {
             How::Options(change) => change(options),
             _ => options,
         };
@@ -82,13 +82,13 @@ impl DeviantMaster {
 
     /// As `Master::submit`.
     pub(crate) fn submit(&mut self, job: Job) -> Result<JobId, Refused> {
-        let job = match self.deviation.how {
+        let job = match self.deviation.injection.0 {
             How::Submits(change) => change(self.notes.ring, job),
             _ => job,
         };
         let id = self.inner.submit(job)?;
         self.notes.open.push((id, job));
-        match self.deviation.how {
+        match self.deviation.injection.0 {
             How::Takes(takes) => takes(&mut self.notes, id, &job),
             How::Doubles(doubles) if doubles(&job) => {
                 if let Ok(second) = self.inner.submit(job) {
@@ -102,7 +102,7 @@ impl DeviantMaster {
 
     /// As `Master::set_nominal`.
     pub(crate) fn set_nominal(&mut self, drive: u8, value: u16) -> Result<(), Refused> {
-        let value = match self.deviation.how {
+        let value = match self.deviation.injection.0 {
             How::Nominal(change) => change(value),
             _ => value,
         };
@@ -111,7 +111,7 @@ impl DeviantMaster {
 
     /// As `Master::actual`.
     pub(crate) fn actual(&self, drive: u8) -> Option<u16> {
-        let drive = match self.deviation.how {
+        let drive = match self.deviation.injection.0 {
             How::Actual(other) => other(self.notes.ring, drive),
             _ => drive,
         };
@@ -121,7 +121,7 @@ impl DeviantMaster {
     /// As `Master::poll_transmit`.
     pub(crate) fn poll_transmit(&mut self, now: Instant) -> Option<u8> {
         for _ in 0..MOST_LEFT_OUT {
-            if matches!(self.deviation.how, How::NoSequence) {
+            if matches!(self.deviation.injection.0, How::NoSequence) {
                 self.skip_sequence(now);
             }
             let phase = self.inner.phase();
@@ -131,7 +131,7 @@ impl DeviantMaster {
             if byte == PAUSE && spoken.what == What::Idle {
                 return Some(byte);
             }
-            let sending = match self.deviation.how {
+            let sending = match self.deviation.injection.0 {
                 How::Sends(sends) | How::Mistakes(sends, _) => sends(&spoken),
                 _ => Sending::Byte(byte),
             };
@@ -207,7 +207,7 @@ impl DeviantMaster {
                 spoken,
                 expected: self.expected(&spoken),
             };
-            if let How::Hears(hears) | How::Mistakes(_, hears) = self.deviation.how {
+            if let How::Hears(hears) | How::Mistakes(_, hears) = self.deviation.injection.0 {
                 received = hears(&heard);
             }
             if let Some(drive) = spoken.drive {
@@ -238,7 +238,7 @@ impl DeviantMaster {
     /// As `Master::poll_timeout`.
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
         let due = self.inner.poll_timeout()?;
-        match self.deviation.how {
+        match self.deviation.injection.0 {
             How::Waits(waits) => waits((self.inner.phase(), due, self.slack, self.byte_time)),
             _ => Some(due),
         }
@@ -272,7 +272,7 @@ impl DeviantMaster {
                 }
                 self.notes.open.retain(|(open, _)| *open != id);
             }
-            let told = match self.deviation.how {
+            let told = match self.deviation.injection.0 {
                 How::Tells(tells) => tells(&mut self.notes, event),
                 _ => Some(event),
             };

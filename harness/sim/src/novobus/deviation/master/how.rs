@@ -2,48 +2,21 @@
 
 use super::speech::Spoken;
 use super::table::DEVIATIONS;
+use crate::deviation::{Deviation, DeviationTable};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{Data, Event, Job, JobId, MasterOptions, Phase};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
-use std::fmt;
 
 /// A way in which a master breaks the manual.
-pub struct MasterDeviation {
-    /// Its name in files: `address-not-counted-up`.
-    pub name: &'static str,
-    /// The section of the ND21's manual that it breaks: `9.3`.
-    pub section: &'static str,
-    /// What such a master does, in one sentence.
-    pub about: &'static str,
-    pub(super) how: How,
-}
+pub type MasterDeviation = Deviation<MasterInjection>;
 
-impl fmt::Debug for MasterDeviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("MasterDeviation").field(&self.name).finish()
-    }
-}
-
-impl PartialEq for MasterDeviation {
-    fn eq(&self, other: &Self) -> bool {
-        self.name == other.name
-    }
-}
-
-impl Eq for MasterDeviation {}
+/// How a master is made to deviate.
+pub struct MasterInjection(pub(super) How);
 
 /// All deviations of a master: in the bytes sent, in the reading of the bytes that come back, in the work, and in the reports.
-pub fn master_deviations() -> impl Iterator<Item = &'static MasterDeviation> {
-    DEVIATIONS.iter()
-}
-
-/// The deviation of this name.
-#[must_use]
-pub fn master_deviation(name: &str) -> Option<&'static MasterDeviation> {
-    master_deviations().find(|deviation| deviation.name == name)
-}
+pub static MASTER_DEVIATIONS: DeviationTable<MasterInjection> = DeviationTable(&[DEVIATIONS]);
 
 /// What becomes of a byte that the master inside sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

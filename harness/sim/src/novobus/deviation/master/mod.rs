@@ -2,7 +2,7 @@
 //!
 //! A [`DeviantMaster`] wraps a right master and is the only place that injects deviations. It changes the jobs that the master
 //! takes, the bytes that it sends and receives, its time-outs, and the events that it reports. The inner master is unchanged.
-//! [`master_deviations`] is the table: a name, a sentence, the section that is broken, and the injection.
+//! [`MASTER_DEVIATIONS`] is the table: a name, a sentence, the section that is broken, and the injection.
 
 mod deviant;
 mod how;
@@ -12,4 +12,4 @@ mod table;
 mod tests;
 
 pub use deviant::DeviantMaster;
-pub use how::{MasterDeviation, master_deviation, master_deviations};
+pub use how::{MASTER_DEVIATIONS, MasterDeviation};

@@ -1,7 +1,8 @@
 //! The wrapper alone changes nothing, and the table is whole.
 
+use super::MASTER_DEVIATIONS;
 use super::how::{How, MasterDeviation, Sending};
-use super::master_deviations;
+use super::table::wrong;
 use crate::novobus::counted::Counted;
 use crate::novobus::fuzz::jobs::Work;
 use crate::novobus::master::AnyMaster;
@@ -11,24 +12,24 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{CyclePace, Event};
 
 static NEUTRAL: [MasterDeviation; 3] = [
-    MasterDeviation {
-        name: "mistakes-nothing",
-        section: "9.1",
-        about: "it sends and hears what it should",
-        how: How::Mistakes(|s| Sending::Byte(s.byte), |h| h.received),
-    },
-    MasterDeviation {
-        name: "tells-all",
-        section: "9.1",
-        about: "it tells what it should",
-        how: How::Tells(|_, event| Some(event)),
-    },
-    MasterDeviation {
-        name: "waits-as-it-should",
-        section: "9.1",
-        about: "it waits for as long as it should",
-        how: How::Waits(|(_, due, ..)| Some(due)),
-    },
+    wrong(
+        "mistakes-nothing",
+        "9.1",
+        "it sends and hears what it should",
+        How::Mistakes(|s| Sending::Byte(s.byte), |h| h.received),
+    ),
+    wrong(
+        "tells-all",
+        "9.1",
+        "it tells what it should",
+        How::Tells(|_, event| Some(event)),
+    ),
+    wrong(
+        "waits-as-it-should",
+        "9.1",
+        "it waits for as long as it should",
+        How::Waits(|(_, due, ..)| Some(due)),
+    ),
 ];
 
 /// What a master sends in each byte time, and what it tells.
@@ -93,13 +94,13 @@ fn the_wrapper_changes_nothing() {
 
 #[test]
 fn names_are_unique_and_sections_are_the_manuals() {
-    let mut names: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let mut names = MASTER_DEVIATIONS.names();
     let all = names.len();
     assert!(all >= 15, "{all}");
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), all);
-    for deviation in master_deviations() {
+    for deviation in MASTER_DEVIATIONS.all() {
         let kebab = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         assert!(deviation.name.chars().all(kebab), "{}", deviation.name);
         assert!(
