@@ -66,8 +66,9 @@ fn short(name: &str) -> String {
 impl Ord for Feature {
     /// By the manual: section 9.2 comes before 10.1.
     fn cmp(&self, other: &Self) -> Ordering {
-        let ((own, place, what), (others, its_place, its_what)) = (self.key(), other.key());
-        own.cmp(others)
+        let ((section, place, what), (others, its_place, its_what)) = (self.key(), other.key());
+        section
+            .cmp(others)
             .then((place, what).cmp(&(its_place, its_what)))
             .then(self.section.cmp(other.section))
     }

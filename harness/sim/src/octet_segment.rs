@@ -92,7 +92,7 @@ impl<S: LineStation + ?Sized> LineStation for Box<S> {
 struct Waiting {
     octet: Octet,
     /// Whether the station sends it, rather than a fault.
-    own: bool,
+    genuine: bool,
     /// Its numbers, of its sender and of all, once it was counted.
     counted: Option<(u64, u64)>,
 }
@@ -138,7 +138,7 @@ impl Member {
         self.telegram.clear();
         self.telegram.extend(octets.iter().map(|&octet| Waiting {
             octet,
-            own: true,
+            genuine: true,
             counted: None,
         }));
         self.next = 0;
@@ -214,7 +214,9 @@ impl<S: LineStation> OctetSegment<S> {
     /// Keeps no record from now on, for long runs.
     pub fn keep_no_record(&mut self) {
         self.keeps_record = false;
-        self.members.iter_mut().for_each(|own| own.record.clear());
+        self.members
+            .iter_mut()
+            .for_each(|member| member.record.clear());
     }
 
     /// Keeps a record again, of what happens from now on.
@@ -354,7 +356,7 @@ impl<S: LineStation> OctetSegment<S> {
                 return;
             }
             self.begin_octet(place, self.now);
-            let Some(end) = self.members[place].flying.as_ref().map(|own| own.end) else {
+            let Some(end) = self.members[place].flying.as_ref().map(|flying| flying.end) else {
                 return;
             };
             let begins = |other: usize| self.start_of(other).is_some_and(|at| at < end);
@@ -375,7 +377,7 @@ impl<S: LineStation> OctetSegment<S> {
     fn next(&self) -> Option<(Instant, Event, usize)> {
         let mut first: Option<(Instant, Event, usize)> = None;
         let mut note = |event: (Instant, Event, usize)| {
-            if first.is_none_or(|own| event < own) {
+            if first.is_none_or(|known| event < known) {
                 first = Some(event);
             }
         };
@@ -466,7 +468,7 @@ impl<S: LineStation> OctetSegment<S> {
     fn take_fault<F>(
         &mut self,
         place: usize,
-        (own, all): (u64, u64),
+        (of_sender, of_all): (u64, u64),
         kind: impl Fn(LineFault) -> Option<F>,
     ) -> Option<F> {
         if self.faults.is_empty() {
@@ -474,8 +476,8 @@ impl<S: LineStation> OctetSegment<S> {
         }
         let found = self.faults.iter().position(|placed| {
             let here = match placed.station {
-                Some(station) => station == place && placed.number == own,
-                None => placed.number == all,
+                Some(station) => station == place && placed.number == of_sender,
+                None => placed.number == of_all,
             };
             here && kind(placed.fault).is_some()
         })?;
@@ -486,7 +488,7 @@ impl<S: LineStation> OctetSegment<S> {
     fn count(&mut self, place: usize) -> Option<(u64, u64)> {
         let member = &mut self.members[place];
         let waiting = &mut member.telegram[member.next];
-        if waiting.own && waiting.counted.is_none() {
+        if waiting.genuine && waiting.counted.is_none() {
             member.octets += 1;
             self.octets += 1;
             waiting.counted = Some((member.octets, self.octets));
@@ -498,8 +500,8 @@ impl<S: LineStation> OctetSegment<S> {
     fn begin_octet(&mut self, place: usize, at: Instant) {
         let numbers = self.count(place);
         let member = &self.members[place];
-        let Waiting { octet, own, .. } = member.telegram[member.next];
-        let sent = own.then_some(octet.byte);
+        let Waiting { octet, genuine, .. } = member.telegram[member.next];
+        let sent = genuine.then_some(octet.byte);
         let mut received = Some(Received {
             byte: octet.byte ^ octet.flips.data,
             error: noticed(octet.flips),
@@ -508,7 +510,7 @@ impl<S: LineStation> OctetSegment<S> {
         while let Some(fault) = numbers.and_then(|numbers| self.octet_fault(place, numbers)) {
             let member = &mut self.members[place];
             match fault {
-                LinkFault::Flip(flips) => received = received.map(|own| flipped(own, flips)),
+                LinkFault::Flip(flips) => received = received.map(|byte| flipped(byte, flips)),
                 LinkFault::Replace(byte) => received = Some(Received::good(byte)),
                 LinkFault::Drop => received = None,
                 LinkFault::Duplicate | LinkFault::Insert(_) => {
@@ -518,7 +520,7 @@ impl<S: LineStation> OctetSegment<S> {
                     };
                     let inserted = Waiting {
                         octet: byte.into(),
-                        own: false,
+                        genuine: false,
                         counted: None,
                     };
                     member.telegram.insert(place, inserted);

@@ -205,14 +205,16 @@ impl Trace {
         let earlier = |at: &mut Instant| *at = *at - origin;
         for channel in &mut self.channels {
             match &mut channel.carried {
-                Carried::Octets(octets) => octets.iter_mut().for_each(|own| earlier(&mut own.at)),
-                Carried::Frames(frames) => frames.iter_mut().for_each(|own| {
-                    earlier(&mut own.start);
-                    earlier(&mut own.at);
+                Carried::Octets(octets) => octets.iter_mut().for_each(|byte| earlier(&mut byte.at)),
+                Carried::Frames(frames) => frames.iter_mut().for_each(|frame| {
+                    earlier(&mut frame.start);
+                    earlier(&mut frame.at);
                 }),
             }
         }
-        self.remarks.iter_mut().for_each(|own| earlier(&mut own.at));
+        self.remarks
+            .iter_mut()
+            .for_each(|remark| earlier(&mut remark.at));
     }
 }
 
@@ -268,8 +270,8 @@ mod tests {
         };
         trace.count_from(Span::from_millis(3));
         assert_eq!(trace.channels[0].octets()[0].at, at(0));
-        let own = trace.channels[1].frames()[0];
-        assert_eq!((own.start, own.at), (at(1), at(2)));
+        let frame = trace.channels[1].frames()[0];
+        assert_eq!((frame.start, frame.at), (at(1), at(2)));
         assert_eq!(trace.remarks[0].at, at(6));
     }
 }

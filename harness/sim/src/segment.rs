@@ -296,7 +296,7 @@ impl<S: Station> Segment<S> {
                 // What happens at the instant of the start bit still takes part.
                 (start, Some(act)) if act <= to && start.is_none_or(|start| act <= start) => {
                     for station in &mut self.stations {
-                        if station.next_action().is_some_and(|own| own <= act) {
+                        if station.next_action().is_some_and(|due| due <= act) {
                             station.advance(act);
                         }
                     }
@@ -479,9 +479,9 @@ impl<S: Station> Segment<S> {
             self.frames += 1;
             self.frames
         });
-        let own = member.frames;
+        let of_station = member.frames;
         let found = self.faults.iter().position(|p| match p.station {
-            Some(station) => station == place && p.frame == own,
+            Some(station) => station == place && p.frame == of_station,
             None => p.frame == number,
         })?;
         Some(self.faults.remove(found).fault)

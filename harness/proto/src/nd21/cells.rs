@@ -268,10 +268,10 @@ pub fn changes_by_itself(address: u16) -> bool {
         ram::ICRA..=ram::ICRA0 + 1,
         ram::CNT2..=ram::CNT_REVERS,
     ];
-    OWN.iter().any(|own| own.contains(&address))
+    OWN.iter().any(|cells| cells.contains(&address))
         || cell_at(address).is_some_and(|cell| {
-            let own = |section: &&str| cell.section.starts_with(*section);
-            SECTIONS.iter().any(own)
+            let is_section = |section: &&str| cell.section.starts_with(*section);
+            SECTIONS.iter().any(is_section)
         })
 }
 

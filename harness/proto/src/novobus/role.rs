@@ -222,7 +222,7 @@ impl Reader {
             return Role::Foreign;
         }
         let place = begun.len() - 1;
-        let own = drive;
+        let addressed = drive;
         let drive = Some(drive);
         let role = match place.checked_sub(1).and_then(|i| layout.answer.get(i)) {
             None | Some(Reply::Echo) => Role::Command {
@@ -240,7 +240,7 @@ impl Reader {
             },
         };
         if begun.len() == layout.length() {
-            self.commands.remove(&own);
+            self.commands.remove(&addressed);
         }
         role
     }

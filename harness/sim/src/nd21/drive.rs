@@ -26,10 +26,10 @@ pub struct Nd21Drive {
 impl Nd21Drive {
     /// A drive with an EEPROM as given, after power-up.
     #[must_use]
-    pub fn new(properties: Properties, own: Nd21Properties, eeprom: [u8; 256]) -> Self {
+    pub fn new(properties: Properties, choices: Nd21Properties, eeprom: [u8; 256]) -> Self {
         Self {
             bus_end: BusEnd::new(properties),
-            program: Program::new(Cells::with_eeprom(eeprom), own),
+            program: Program::new(Cells::with_eeprom(eeprom), choices),
             properties,
         }
     }

@@ -96,8 +96,8 @@ impl EepromController {
     /// When something that is being done is done.
     pub(super) fn busy_until(&self) -> Option<Instant> {
         let bus = self.busy.map(|job| job.until);
-        let own = self.storing.map(|(_, _, until)| until);
-        bus.into_iter().chain(own).min()
+        let storing = self.storing.map(|(_, _, until)| until);
+        bus.into_iter().chain(storing).min()
     }
 
     /// Begins to store a position for the cycle control; false while another is being stored.
@@ -169,14 +169,14 @@ impl EepromController {
             let cells = nd21::PARAMETERS..nd21::PARAMETERS + nd21::PARAMETER_COUNT;
             cells.map(|cell| memory.peek(cell)).collect::<Vec<_>>()
         };
-        let own = self.storing.take();
-        let own = own.map(|(address, position, until)| (address, position.to_vec(), until));
+        let storing = self.storing.take();
+        let storing = storing.map(|(address, position, until)| (address, position.to_vec(), until));
         let bus = self.busy.take().and_then(|job| match job.command {
             Command::ReadByte => None,
             Command::WriteByte => Some((job.address, vec![job.data], job.until)),
             Command::ProgParam => Some((nd21::EE_PARAMETERS, parameters(memory), job.until)),
         });
-        for (address, bytes, until) in own.into_iter().chain(bus) {
+        for (address, bytes, until) in storing.into_iter().chain(bus) {
             let left = if until > now {
                 until.since(now).units()
             } else {

@@ -457,8 +457,8 @@ mod tests {
             assert!(speed <= u32::from(MAX_SPEED));
             driven += u32::from(speed != 0);
             let mut allowed = before;
-            for own in [ram::PS_STATUS, ram::PS_IMPULS, ram::PS_IMPULS + 1] {
-                allowed.put(own, cells.byte(own));
+            for cell in [ram::PS_STATUS, ram::PS_IMPULS, ram::PS_IMPULS + 1] {
+                allowed.put(cell, cells.byte(cell));
             }
             assert_eq!(cells, allowed);
         }

@@ -411,10 +411,10 @@ mod tests {
             scope.scan(&mut cells);
             let buffer = || (0xFDA0..=0xFE9F).filter(|&a| cells.byte(a) != before.byte(a));
             assert!(buffer().count() <= 1);
-            let own = [0xFF38, 0xFF3A, 0xFF3B, 0xFF3C, 0xFF3D];
+            let state = [0xFF38, 0xFF3A, 0xFF3B, 0xFF3C, 0xFF3D];
             let mut allowed = before.clone();
             buffer()
-                .chain(own)
+                .chain(state)
                 .for_each(|a| allowed.put(a, cells.byte(a)));
             assert_eq!(cells, allowed);
         }

@@ -202,8 +202,8 @@ impl LineStation for Drive {
         if !self.powered {
             return None;
         }
-        let own = self.slave.next_action();
-        own.into_iter().chain(self.inverter.next_action()).min()
+        let slave = self.slave.next_action();
+        slave.into_iter().chain(self.inverter.next_action()).min()
     }
 
     fn advance(&mut self, to: Instant) {

@@ -53,9 +53,9 @@ pub struct FaultMemory {
 
 impl Hash for FaultMemory {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        let past = self.past.iter().filter(|own| own.code != 0);
+        let past = self.past.iter().filter(|fault| fault.code != 0);
         (self.pending, self.counters).hash(state);
-        past.for_each(|own| own.hash(state));
+        past.for_each(|fault| fault.hash(state));
     }
 }
 

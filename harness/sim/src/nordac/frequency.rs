@@ -144,8 +144,8 @@ impl Eq for Frequency {}
 
 impl Hash for Frequency {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        let own = self.settled();
-        (own.numerator, own.denominator).hash(state);
+        let settled = self.settled();
+        (settled.numerator, settled.denominator).hash(state);
     }
 }
 

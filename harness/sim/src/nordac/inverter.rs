@@ -114,7 +114,7 @@ impl Inverter {
         let mut parameters = Parameters::default();
         for (number, index, value) in &setup.parameters {
             let known = Parameter::of(*number);
-            if let Some(parameter) = known.filter(|own| own.raw_of((*value).into()).is_some()) {
+            if let Some(parameter) = known.filter(|known| known.raw_of((*value).into()).is_some()) {
                 parameters.store(parameter, *index, *value);
             }
         }
@@ -203,13 +203,13 @@ impl Inverter {
 
     /// Feeds all that decides what it does from `at` on, but its properties, to a checksum.
     pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
-        let ago = |own: Option<Instant>| own.map(|own| at.since(own));
+        let ago = |instant: Option<Instant>| instant.map(|instant| at.since(instant));
         (&self.parameters, self.settings, self.faults, self.state).hash(sum);
         (self.words, self.controlled, self.cause).hash(sum);
         // Where 1625 is 0, the last exchange counts only for who sets it later, to less than has passed since.
         let heard = self.heard.filter(|_| self.value(1625) != 0);
         (ago(heard), self.heard.is_some(), ago(self.lost)).hash(sum);
-        self.apart.map(|own| own.since(at)).hash(sum);
+        self.apart.map(|instant| instant.since(at)).hash(sum);
         self.ramp.hash_state(at, sum);
     }
 

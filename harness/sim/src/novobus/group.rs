@@ -232,9 +232,9 @@ impl Group {
         let relay = before.receive(byte)?;
         let sum = before.addressing().or_else(|| relay.addressing());
         let addressed = sum.map(u8::wrapping_neg);
-        let addressed = addressed.filter(|own| usize::from(*own) < self.places.len());
-        if let Some(own) = addressed.filter(|own| *own >= number) {
-            let at = at + self.byte_time * u64::from(own - number);
+        let addressed = addressed.filter(|drive| usize::from(*drive) < self.places.len());
+        if let Some(drive) = addressed.filter(|drive| *drive >= number) {
+            let at = at + self.byte_time * u64::from(drive - number);
             self.waiting.push(Reverse((at, self.count())));
         }
         Some(Entry {
@@ -284,24 +284,24 @@ impl Group {
         let Some(entry) = self.entry(number).copied() else {
             return false;
         };
-        let own = entry.addressed.unwrap_or_default();
-        let offset = usize::from(own);
+        let drive = entry.addressed.unwrap_or_default();
+        let offset = usize::from(drive);
         let Some(node) = nodes.get_mut(offset) else {
             return false;
         };
         self.make_up(self.places.start + offset, number, node.device_mut());
-        let before = offset.checked_sub(1).and_then(|own| inner.get(own));
+        let before = offset.checked_sub(1).and_then(|link| inner.get(link));
         let received = before.map_or(self.received_before, Link::arrived);
         let sent = inner
             .get(offset)
             .map_or(self.sent_before, Link::transmitted);
         let number_of = |before: u64| before + number as u64 + 1;
-        let answer = node.answer(at, entry.at(own), number_of(received), number_of(sent));
+        let answer = node.answer(at, entry.at(drive), number_of(received), number_of(sent));
         let kept = self.entries.get_mut(number - self.dropped);
         if let (Some(kept), Some(answer)) = (kept, answer) {
             kept.answer = answer;
         }
-        node.relay() == Some(entry.relay.behind(own))
+        node.relay() == Some(entry.relay.behind(drive))
     }
 
     /// Lets the drive in this place make up for the bytes that it has passed on, of the first `count`.

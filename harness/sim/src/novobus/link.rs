@@ -159,7 +159,7 @@ impl Link {
     /// what arrives there was fed.
     pub(crate) fn delivered(&self) -> u64 {
         let under_way = self.bytes.under_way().iter();
-        let sent = under_way.filter(|own| own.is_sent()).count() as u64;
+        let sent = under_way.filter(|byte| byte.is_sent()).count() as u64;
         self.transmitted.saturating_sub(sent)
     }
 
@@ -230,11 +230,11 @@ impl Link {
 
     fn lose_after(&mut self, now: Instant) {
         // On an open link the bytes under way are not the transmitter's.
-        let own = match &mut self.opening {
+        let bytes = match &mut self.opening {
             None => &mut self.bytes,
             Some(opening) => &mut opening.sent,
         };
-        for byte in own.under_way_mut() {
+        for byte in bytes.under_way_mut() {
             if byte.at > now {
                 byte.lose();
             }

@@ -39,8 +39,8 @@ mod tests {
     #[test]
     fn every_remark_is_read_as_it_was_made() {
         let causes = BusError::ALL.into_iter().map(Some).chain([None]);
-        for (cause, own) in causes.zip([Marks::DETECTED, Marks::CHECKSUM].into_iter().cycle()) {
-            let marks = own.and(Marks::UPSTREAM);
+        for (cause, mark) in causes.zip([Marks::DETECTED, Marks::CHECKSUM].into_iter().cycle()) {
+            let marks = mark.and(Marks::UPSTREAM);
             let remark = Remark {
                 station: 0,
                 piece: 1,

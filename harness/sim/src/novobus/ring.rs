@@ -180,13 +180,13 @@ impl<D: Device> Ring<D> {
         &self,
         link: usize,
     ) -> Option<impl ExactSizeIterator<Item = LineByte> + Clone + '_> {
-        let own = self.links.get(link)?;
+        let carried = self.links.get(link)?;
         let inside = |group: &&Group| group.places().skip(1).any(|place| place == link);
         let group = self.groups.iter().find(inside);
-        let first = own.logged();
+        let first = carried.logged();
         let count = first + group.map_or(0, |group| group.logged(link, self.now));
         let byte = move |index: usize| match index.checked_sub(first) {
-            None => own.logged_byte(index),
+            None => carried.logged_byte(index),
             Some(index) => group?.logged_byte(link, index),
         };
         // Each index is that of a byte.
@@ -460,10 +460,10 @@ impl<D: Device> Ring<D> {
         let mut groups = self.groups.iter().map(Group::places).peekable();
         let mut place = 0;
         std::iter::from_fn(move || {
-            let own = place;
-            let group = groups.next_if(|group| group.start == own);
-            place = group.map_or(own + 1, |group| group.end);
-            (own < self.links.len()).then_some(own)
+            let here = place;
+            let group = groups.next_if(|group| group.start == here);
+            place = group.map_or(here + 1, |group| group.end);
+            (here < self.links.len()).then_some(here)
         })
     }
 

@@ -76,37 +76,37 @@ struct Carried {
 
 impl Carried {
     fn sent(all: &[UnderWay], byte_time: Span) -> Self {
-        let mut own = Self {
+        let mut carried = Self {
             bytes: Vec::with_capacity(all.len()),
             ..Self::default()
         };
         let mut free = None;
         for byte in all {
-            let last = own.runs.last_mut();
+            let last = carried.runs.last_mut();
             let start = byte.at - byte_time;
             match last.filter(|run| free == Some(start) && run.solicited == byte.solicited()) {
                 Some(run) => run.count += 1,
-                None => own.runs.push(Run {
+                None => carried.runs.push(Run {
                     start,
                     count: 1,
                     solicited: byte.solicited(),
                 }),
             }
             free = Some(byte.at);
-            own.bytes.push(byte.sent());
+            carried.bytes.push(byte.sent());
         }
-        own
+        carried
     }
 
     fn heard(all: Vec<UnderWay>) -> Self {
-        let mut own = Self::default();
+        let mut carried = Self::default();
         for received in all.into_iter().filter_map(|byte| byte.unpack().arrival()) {
             if let Some(error) = received.error {
-                own.errors.push((own.bytes.len(), error));
+                carried.errors.push((carried.bytes.len(), error));
             }
-            own.bytes.push(received.byte);
+            carried.bytes.push(received.byte);
         }
-        own
+        carried
     }
 
     fn received(&self) -> Vec<Received> {
@@ -204,20 +204,20 @@ impl<T> Default for Met<T> {
 }
 
 impl<T: Hash + Eq> Met<T> {
-    fn number(&mut self, own: T) -> u32 {
-        let hash = Mixing::default().hash_one(&own);
+    fn number(&mut self, value: T) -> u32 {
+        let hash = Mixing::default().hash_one(&value);
         let last = self.last.get(&hash).copied();
         let mut same = last;
         while let Some(number) = same {
             let (other, _, before) = &self.all[number as usize];
-            if **other == own {
+            if **other == value {
                 return number;
             }
             same = *before;
         }
         // Memory ends before the numbers do.
         let number = u32::try_from(self.all.len()).unwrap_or(u32::MAX);
-        self.all.push((Box::new(own), hash, last));
+        self.all.push((Box::new(value), hash, last));
         self.last.insert(hash, number);
         number
     }
@@ -293,7 +293,7 @@ impl SharedRing {
     #[must_use]
     pub fn new(ring: &Ring<Drive>) -> Option<(Self, SharedState)> {
         let (links, nodes) = ring.at_rest()?;
-        let mut own = Self {
+        let mut shared = Self {
             byte_time: ring.byte_time(),
             places: Met::default(),
             under_way: Met::default(),
@@ -320,10 +320,10 @@ impl SharedRing {
                 node,
                 line_free: outbound.map_or(Instant::START, Link::line_free),
             };
-            places.push(own.met(place));
+            places.push(shared.met(place));
         }
         let now = ring.now();
-        Some((own, SharedState { places, now }))
+        Some((shared, SharedState { places, now }))
     }
 
     fn met(&mut self, mut place: RingPlace) -> PlaceState {
@@ -346,8 +346,8 @@ impl SharedRing {
         if let Some(became) = self.steps.of.get(&(place, stream, until)) {
             return *became;
         }
-        let own = self.place(place);
-        let became = self.work(own, stream, until);
+        let ring_place = self.place(place);
+        let became = self.work(ring_place, stream, until);
         self.steps.insert((place, stream, until), became);
         became
     }
@@ -419,8 +419,8 @@ impl SharedRing {
         let until = passage.after.now;
         let mut passage = passage.clone();
         let mut stream = became.sent;
-        if let Some(own) = passage.after.places.get_mut(link) {
-            *own = became.place;
+        if let Some(place) = passage.after.places.get_mut(link) {
+            *place = became.place;
         }
         for place in link + 1..before.places.len() {
             // From here on everything is as in the passage.
@@ -501,34 +501,34 @@ impl Hasher for Mix {
     fn write(&mut self, bytes: &[u8]) {
         let mut words = bytes.chunks_exact(8);
         for word in &mut words {
-            let mut own = [0; 8];
-            own.copy_from_slice(word);
-            self.mix(u64::from_le_bytes(own));
+            let mut eight = [0; 8];
+            eight.copy_from_slice(word);
+            self.mix(u64::from_le_bytes(eight));
         }
-        let mut own = [0; 8];
+        let mut padded = [0; 8];
         let rest = words.remainder();
-        own[..rest.len()].copy_from_slice(rest);
-        self.mix(u64::from_le_bytes(own));
+        padded[..rest.len()].copy_from_slice(rest);
+        self.mix(u64::from_le_bytes(padded));
     }
 
     #[inline]
-    fn write_u8(&mut self, own: u8) {
-        self.mix(u64::from(own));
+    fn write_u8(&mut self, value: u8) {
+        self.mix(u64::from(value));
     }
 
     #[inline]
-    fn write_u32(&mut self, own: u32) {
-        self.mix(u64::from(own));
+    fn write_u32(&mut self, value: u32) {
+        self.mix(u64::from(value));
     }
 
     #[inline]
-    fn write_u64(&mut self, own: u64) {
-        self.mix(own);
+    fn write_u64(&mut self, value: u64) {
+        self.mix(value);
     }
 
     #[inline]
-    fn write_usize(&mut self, own: usize) {
-        self.mix(own as u64);
+    fn write_usize(&mut self, value: usize) {
+        self.mix(value as u64);
     }
 
     fn finish(&self) -> u64 {

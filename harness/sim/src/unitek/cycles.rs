@@ -28,9 +28,9 @@ pub struct Cycles {
 impl Cycles {
     /// Begins a cycle in millisecond `now`, or begins it again with another interval; `false` if the table is full.
     pub fn start(&mut self, register: u8, every: u8, now: u64, full: TableFull) -> bool {
-        let own = self.place_of(register);
+        let known = self.place_of(register);
         let free = || self.places.iter().position(Option::is_none);
-        let Some(place) = own.or_else(free).or_else(|| self.to_give_up(full)) else {
+        let Some(place) = known.or_else(free).or_else(|| self.to_give_up(full)) else {
             return false;
         };
         self.requests += 1;
@@ -78,13 +78,13 @@ impl Cycles {
     pub fn state(&self, now: u64) -> impl Iterator<Item = impl std::hash::Hash> {
         let places = self.places.iter().enumerate();
         places.filter_map(move |(place, cycle)| {
-            let own = (*cycle)?;
+            let cycle = (*cycle)?;
             let times = (
-                own.due.saturating_sub(now),
-                own.late,
-                self.requests - own.order,
+                cycle.due.saturating_sub(now),
+                cycle.late,
+                self.requests - cycle.order,
             );
-            Some((place, own.register, own.every, times))
+            Some((place, cycle.register, cycle.every, times))
         })
     }
 

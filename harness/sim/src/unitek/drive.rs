@@ -242,11 +242,11 @@ impl Drive {
 
     /// Takes identifiers and bit timing over from the registers, as far as they are used at once, or all of them `at_power_up`.
     fn use_bus_settings(&mut self, at_power_up: bool) {
-        let own = &self.properties;
-        if at_power_up || own.id_change == IdChange::Immediate {
+        let properties = &self.properties;
+        if at_power_up || properties.id_change == IdChange::Immediate {
             self.identifiers = (self.cell16(0x68), self.cell16(0x69));
         }
-        let second = match own.second_identifiers {
+        let second = match properties.second_identifiers {
             SecondIdentifiers::Stored => false,
             SecondIdentifiers::Immediate => true,
             SecondIdentifiers::Restart => at_power_up,
@@ -254,7 +254,7 @@ impl Drive {
         if second {
             self.second = (self.cells[0x88], self.cells[0x89]);
         }
-        if at_power_up || own.rate_change == RateChange::Immediate {
+        if at_power_up || properties.rate_change == RateChange::Immediate {
             let (rate, set_up) = self.bus;
             let timing = self.cell16(0x73);
             self.on_bus = timing == set_up || Nbt(timing).rate() == Some(rate);
@@ -276,14 +276,14 @@ impl Drive {
         let dlc4 = self.properties.dlc4;
         match Request::decode(frame, rx, dlc4) {
             Err(Ignored::OtherIdentifier) if self.second.0 != 0 => {
-                let own = |raw: u32| {
+                let identifier = |raw: u32| {
                     u16::try_from(raw)
                         .ok()
                         .filter(|id| (1..=0x7FF).contains(id))
                 };
-                let rx = own(self.second.0).ok_or(Ignored::OtherIdentifier)?;
+                let rx = identifier(self.second.0).ok_or(Ignored::OtherIdentifier)?;
                 let request = Request::decode(frame, rx, dlc4)?;
-                Ok((request, own(self.second.1).unwrap_or(tx)))
+                Ok((request, identifier(self.second.1).unwrap_or(tx)))
             }
             read => Ok((read?, tx)),
         }
@@ -328,11 +328,11 @@ impl Drive {
         let (request, tx) = match self.reads(frame) {
             Ok(read) => read,
             Err(ignored) => {
-                let own = !matches!(
+                let reached = !matches!(
                     ignored,
                     Ignored::Extended | Ignored::OtherIdentifier | Ignored::OtherRate
                 );
-                self.count(0x97, own);
+                self.count(0x97, reached);
                 return Err(ignored);
             }
         };

@@ -271,11 +271,11 @@ impl Reference {
         }
         self.last = self.now;
         if d[0] == 0x3D {
-            let (own, other) = (self.tx, self.second.1);
-            let tx = if second && (1..=0x7FF).contains(&other) {
-                other
+            let (first, second_tx) = (self.tx, self.second.1);
+            let tx = if second && (1..=0x7FF).contains(&second_tx) {
+                second_tx
             } else {
-                own
+                first
             };
             return self.request(d[1], d[2], tx);
         }
@@ -300,13 +300,13 @@ impl Reference {
     }
 
     fn request(&mut self, number: u8, t: u8, tx: u32) -> Option<Frame> {
-        let own = self
+        let running = self
             .table
             .iter()
             .position(|e| e.is_some_and(|e| e.0 == number));
         let stops = t == 255 || (t == 0 && self.p.oneshot_stops.word() == "yes");
-        if let (Some(own), true) = (own, stops) {
-            self.table[own] = None;
+        if let (Some(running), true) = (running, stops) {
+            self.table[running] = None;
         }
         if t == 0 {
             return self.answer(number, false, tx);
@@ -314,7 +314,7 @@ impl Reference {
         if t == 255 {
             return None;
         }
-        let mut place = own.or(self.table.iter().position(Option::is_none));
+        let mut place = running.or(self.table.iter().position(Option::is_none));
         if place.is_none() && self.p.table_full.word() == "oldest" {
             place = (0..8).min_by_key(|&k| self.table[k].map_or(0, |e| e.3));
         }

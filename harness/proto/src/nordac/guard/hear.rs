@@ -15,7 +15,7 @@ impl Ear {
     /// An octet was sent, perhaps the last but one of a request. It ends what was received.
     pub(super) fn ask(&mut self, request: Option<&Pdu>) {
         if let Some(request) = request {
-            self.asked = Some(*request).filter(|own| own.fc().is_request());
+            self.asked = Some(*request).filter(|request| request.fc().is_request());
         }
         self.came.clear();
     }
@@ -35,11 +35,11 @@ impl Ear {
         // A request has one reply, which begins with the first octet.
         self.asked = None;
         let reply = reply?;
-        let own = (reply.sa(), reply.da()) == (asked.da(), asked.sa());
+        let answers = (reply.sa(), reply.da()) == (asked.da(), asked.sa());
         let known = matches!(
             reply.fc().status(),
             Some(Status::DataLow | Status::DataHigh | Status::Rs)
         );
-        (own && known).then_some((asked, reply))
+        (answers && known).then_some((asked, reply))
     }
 }

@@ -66,7 +66,7 @@ impl KnownSlave {
     /// Where it may be but at this address, the last one first.
     pub(super) fn others(&self, address: u8) -> impl Iterator<Item = u8> {
         let all = self.addresses.iter().rev().copied();
-        all.filter(move |own| *own != address)
+        all.filter(move |other| *other != address)
     }
 
     /// Where it was last.
@@ -78,7 +78,7 @@ impl KnownSlave {
     pub(super) fn readings(&self, octets: usize) -> impl Iterator<Item = PpoType> {
         let known = self.ppo.filter(|ppo| ppo.octets() == octets);
         let fits =
-            move |ppo: &PpoType| ppo.octets() == octets && known.is_none_or(|own| own == *ppo);
+            move |ppo: &PpoType| ppo.octets() == octets && known.is_none_or(|known| known == *ppo);
         PpoType::ALL.into_iter().filter(fits)
     }
 
@@ -268,7 +268,7 @@ impl KnownSlave {
     }
 
     fn moved_to(&mut self, address: u8) {
-        self.addresses.retain(|own| *own != address);
+        self.addresses.retain(|known| *known != address);
         self.addresses.push(address);
     }
 }

@@ -122,7 +122,7 @@ impl Gate {
 
     /// Takes notice of a parameter that was read: 1205 (of a set, 0 to 3), 1622, 1625.
     pub fn learn(&mut self, address: u8, number: u16, set: u8, raw: u32) {
-        for slave in self.slaves.iter_mut().filter(|own| own.is(address)) {
+        for slave in self.slaves.iter_mut().filter(|slave| slave.is(address)) {
             slave.learn(number, set, raw);
         }
     }
@@ -131,7 +131,7 @@ impl Gate {
     /// [learnt](Self::learn): answers of the parameter channel to a task that reads, and the configuration that Get_Cfg asks for.
     pub fn hear(&mut self, octet: Option<u8>) {
         if let Some((asked, reply)) = self.ear.hear(octet) {
-            for slave in self.slaves.iter_mut().filter(|own| own.is(asked.da())) {
+            for slave in self.slaves.iter_mut().filter(|slave| slave.is(asked.da())) {
                 slave.replied(&asked, &reply);
             }
         }
@@ -163,8 +163,11 @@ impl Gate {
 
     /// The addresses at which a slave of the rig's file may be: its own, and behind it those that tasks have given it (1624, 970, 1602).
     pub fn places(&self, address: u8) -> impl Iterator<Item = u8> {
-        let own = self.slaves.iter().find(move |own| own.listed() == address);
-        let others = own.into_iter().flat_map(move |own| own.others(address));
+        let mut slaves = self.slaves.iter();
+        let slave = slaves.find(move |slave| slave.listed() == address);
+        let others = slave
+            .into_iter()
+            .flat_map(move |slave| slave.others(address));
         core::iter::once(address).chain(others)
     }
 
@@ -195,14 +198,16 @@ impl Gate {
             }),
         };
         let idle_command = service == Some(Service::GlobalControl)
-            && GlobalControl::decode(pdu.data()).is_some_and(|own| own.command == 0);
+            && GlobalControl::decode(pdu.data()).is_some_and(|control| control.command == 0);
         if idle_command {
             return Ok(());
         }
-        let own = self.slaves.iter().any(|slave| slave.is(station));
+        let is_listed = self.slaves.iter().any(|slave| slave.is(station));
         if station == BROADCAST {
             denied(Act::Broadcast, Missing::BusSettings)?;
-        } else if !own && (service == Some(Service::SetSlaveAdd) || !self.limits.other_stations) {
+        } else if !is_listed
+            && (service == Some(Service::SetSlaveAdd) || !self.limits.other_stations)
+        {
             return Err(Denial::OtherStation { station });
         }
         match service {

@@ -25,8 +25,8 @@ impl Relay {
     #[inline]
     pub fn behind(self, places: u8) -> Self {
         match self {
-            Self::Passing(own) => Self::Passing(own.behind(places)),
-            Self::Climbing(own) => Self::Climbing(own.behind(places)),
+            Self::Passing(passing) => Self::Passing(passing.behind(places)),
+            Self::Climbing(climb) => Self::Climbing(climb.behind(places)),
         }
     }
 
@@ -35,8 +35,8 @@ impl Relay {
     #[inline]
     pub fn ahead(self, places: u8) -> Self {
         match self {
-            Self::Passing(own) => Self::Passing(own.behind(places.wrapping_neg())),
-            Self::Climbing(own) => Self::Climbing(own.ahead(places)),
+            Self::Passing(passing) => Self::Passing(passing.behind(places.wrapping_neg())),
+            Self::Climbing(climb) => Self::Climbing(climb.ahead(places)),
         }
     }
 
@@ -45,19 +45,19 @@ impl Relay {
     #[must_use]
     pub fn receive(self, byte: u8) -> Option<Self> {
         match self {
-            Self::Passing(own) => own.receive(byte).map(Self::Passing),
-            Self::Climbing(own) => own.receive(byte).map(Self::Climbing),
+            Self::Passing(passing) => passing.receive(byte).map(Self::Passing),
+            Self::Climbing(climb) => climb.receive(byte).map(Self::Climbing),
         }
     }
 
-    /// The same of a row that begins one drive ahead, with a drive that keeps `own`; `None` where that drive is none of the row.
+    /// The same of a row that begins one drive ahead, with a drive that keeps `leader`; `None` where that drive is none of the row.
     #[must_use]
-    pub fn led_by(self, own: Self) -> Option<Self> {
-        match (self, own) {
-            (Self::Passing(row), Self::Passing(own)) => {
-                (own.behind(1) == row).then_some(Self::Passing(own))
+    pub fn led_by(self, leader: Self) -> Option<Self> {
+        match (self, leader) {
+            (Self::Passing(row), Self::Passing(leader)) => {
+                (leader.behind(1) == row).then_some(Self::Passing(leader))
             }
-            (Self::Climbing(row), Self::Climbing(own)) => row.led_by(own).map(Self::Climbing),
+            (Self::Climbing(row), Self::Climbing(leader)) => row.led_by(leader).map(Self::Climbing),
             _ => None,
         }
     }

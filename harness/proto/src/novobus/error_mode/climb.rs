@@ -90,13 +90,13 @@ impl Climb {
         if self.from == 0 { self.matched } else { 0 }
     }
 
-    /// The same of a row that begins one drive ahead, with a drive that keeps `own`; `None` where that drive is none of the row. A drive
+    /// The same of a row that begins one drive ahead, with a drive that keeps `leader`; `None` where that drive is none of the row. A drive
     /// that adds 1 has not sent a zero.
-    pub(in crate::novobus) fn led_by(self, own: Self) -> Option<Self> {
+    pub(in crate::novobus) fn led_by(self, leader: Self) -> Option<Self> {
         let row = self.ahead(1);
-        let fits = self.zeros == 0 && row.of_first() == own.of_first();
+        let fits = self.zeros == 0 && row.of_first() == leader.of_first();
         fits.then_some(Self {
-            zeros: own.zeros,
+            zeros: leader.zeros,
             ..row
         })
     }

@@ -50,8 +50,8 @@ impl Asked {
         match (command.act, answer) {
             _ if command.address != address => return false,
             (DriveAct::Read(cell), [code, low, data, ..]) => {
-                let [_, own] = cell.to_be_bytes();
-                if own != *low || !matches!(code, 0xC0 | 0xC1 | 0xC7) {
+                let [_, cell_low] = cell.to_be_bytes();
+                if cell_low != *low || !matches!(code, 0xC0 | 0xC1 | 0xC7) {
                     return false;
                 }
                 match (code, cell) {

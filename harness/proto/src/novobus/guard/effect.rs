@@ -118,7 +118,7 @@ fn of_process_data(address: u16) -> Need {
     };
     match [address, address.wrapping_add(1)] {
         // They would say by themselves where the next ones are written.
-        own if own.contains(&ram::DATA_IN) => Need::EVERYTHING,
+        cells if cells.contains(&ram::DATA_IN) => Need::EVERYTHING,
         [first, second] => any_byte(first).and(any_byte(second)),
     }
 }

@@ -155,8 +155,8 @@ impl Facts {
 
 impl fmt::Display for Facts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let own = TEXTS.iter().filter(|(fact, ..)| self.contains(*fact));
-        for (place, (_, what, remedy)) in own.enumerate() {
+        let unknown = TEXTS.iter().filter(|(fact, ..)| self.contains(*fact));
+        for (place, (_, what, remedy)) in unknown.enumerate() {
             let and = if place == 0 { "" } else { "; " };
             write!(f, "{and}that {what}: {remedy}")?;
         }
@@ -230,8 +230,8 @@ impl Known {
 
     /// Takes in values that were read from a drive; earlier knowledge is dropped.
     pub(super) fn learn(&mut self, found: &Found, limits: &Limits) {
-        let own = found.configuration;
-        let range = SpeedRange::from_sw_version2(own.sw_version2);
+        let configuration = found.configuration;
+        let range = SpeedRange::from_sw_version2(configuration.sw_version2);
         let slow = |raw: u16| limits.max_speed.is_none_or(|most| within(raw, range, most));
         let unsigned = |raw: u16| raw < 0x8000 && slow(raw);
         let busy = ps_status::CALCULATE
@@ -241,17 +241,19 @@ impl Known {
             | ps_status::BRAKING
             | ps_status::TARGET_BRAKING;
         let stored = found.stored.is_some_and(|stored| {
-            stored.waits_for_bus() && stored.no_switches() && stored.sw_version2 == own.sw_version2
+            stored.waits_for_bus()
+                && stored.no_switches()
+                && stored.sw_version2 == configuration.sw_version2
         });
         let [first, back] = found.ref_speeds;
         let facts = [
-            Facts::SOURCE.when(own.waits_for_bus()),
-            Facts::NO_SWITCHES.when(own.no_switches()),
+            Facts::SOURCE.when(configuration.waits_for_bus()),
+            Facts::NO_SWITCHES.when(configuration.no_switches()),
             Facts::NSOLL.when(slow(found.nsoll)),
             Facts::PS_V0.when(unsigned(found.ps_v0)),
             Facts::REF_V1.when(slow(first)),
             Facts::REF_V2.when(slow(back)),
-            Facts::TRAPEZOID.when(own.sw_version2 & sw_version2::NO_S_RAMP != 0),
+            Facts::TRAPEZOID.when(configuration.sw_version2 & sw_version2::NO_S_RAMP != 0),
             Facts::PS_IDLE.when(found.ps_status & busy == 0),
             Facts::FLAGS2_IDLE.when(found.flags2 & flags2::ORDERS == 0),
             Facts::AFTER_RESET.when(stored),

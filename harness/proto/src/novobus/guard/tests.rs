@@ -74,13 +74,13 @@ fn the_eeprom_controller() {
 /// ND21 14.10.2: what switches the watch over silences on needs a permission of its own, by whichever way.
 #[test]
 fn monitoring_needs_its_own_permission() {
-    let other = Limits {
+    let refuses = Limits {
         monitoring: false,
         ..Limits::unlimited()
     };
-    let own = Limits {
+    let allows = Limits {
         monitoring: true,
-        ..other
+        ..refuses
     };
     // Flags2 bit 2: Or, WriteByte, a word over it and its neighbours.
     let words = [(0x56_u8, 0x0004_u16), (0x57, 0x0400)].map(|(low, data)| {
@@ -113,19 +113,19 @@ fn monitoring_needs_its_own_permission() {
         .concat(),
     ];
     for bytes in cases {
-        let denied = behind(other, &bytes, false);
+        let denied = behind(refuses, &bytes, false);
         let Err(Cause::NotAllowed { missing, .. }) = denied else {
             panic!("{bytes:02X?}");
         };
         assert!(missing.contains(Need::MONITORING), "{bytes:02X?}");
-        assert!(behind(own, &bytes, false).is_ok(), "{bytes:02X?}");
+        assert!(behind(allows, &bytes, false).is_ok(), "{bytes:02X?}");
     }
     for bytes in [
         write_eeprom(0x47, 0x7F),
         write_eeprom(0x46, 0xFF),
         write(ram::FLAGS2, 0xFB).to_vec(),
     ] {
-        assert!(behind(other, &bytes, false).is_ok(), "{bytes:02X?}");
+        assert!(behind(refuses, &bytes, false).is_ok(), "{bytes:02X?}");
     }
 }
 

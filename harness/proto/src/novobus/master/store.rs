@@ -129,7 +129,6 @@ impl Entry {
         self.layout.answer.last() == Some(&Reply::Check)
     }
 
-    /// What was read.
     pub(super) fn read(&self) -> Data {
         Data {
             width: self.kind.width(),

@@ -65,7 +65,7 @@ impl Guarded {
 
     /// Whether it may receive or send on an identifier.
     pub(super) fn may_use(&self, id: u16) -> bool {
-        self.receives().chain(self.sends()).any(|own| own == id)
+        self.receives().chain(self.sends()).any(|used| used == id)
     }
 
     /// On which it may receive, its first identifier before the others, of these the latest first.
@@ -81,18 +81,20 @@ impl Guarded {
     /// The identifier that a write of `value` to `register` would give it, although it is taken: another drive may use it, or this one for
     /// the other direction.
     pub(super) fn taken(&self, register: u8, value: u16, others: &[Self]) -> Option<u16> {
-        let own = match register {
+        let used_here = match register {
             0x68 | 0x88 => self.sends().any(|id| id == value),
             0x69 | 0x89 => self.receives().any(|id| id == value),
             _ => return None,
         };
-        let mut others = others.iter().filter(|own| own.first_rx != self.first_rx);
-        (own || others.any(|other| other.may_use(value))).then_some(value)
+        let mut others = others
+            .iter()
+            .filter(|other| other.first_rx != self.first_rx);
+        (used_here || others.any(|other| other.may_use(value))).then_some(value)
     }
 
     /// It has answered on this identifier.
     pub(super) fn found(&mut self, rx: u16) {
-        if !self.receives().any(|own| own == rx) {
+        if !self.receives().any(|known| known == rx) {
             self.rx.push(rx);
         }
         self.sure_rx = Some(rx);
@@ -134,7 +136,7 @@ impl Guarded {
                 if !self.cycles.iter().any(|(with, _)| *with == register) {
                     self.cycles.push((register, every));
                 }
-                match self.started.iter_mut().find(|own| own.0 == register) {
+                match self.started.iter_mut().find(|cycle| cycle.0 == register) {
                     Some((_, longest)) => *longest = every.max(*longest),
                     None => self.started.push((register, every)),
                 }

@@ -193,7 +193,11 @@ impl Gate {
     /// Takes notice of C8, the rpm of 100 % speed, and of 34, the limit of the speed, as they were read from the drive that receives
     /// on `rx`.
     pub fn learn(&mut self, rx: u16, full: u16, limit: u16) {
-        for drive in self.drives.iter_mut().filter(|own| own.rx.contains(&rx)) {
+        for drive in self
+            .drives
+            .iter_mut()
+            .filter(|drive| drive.rx.contains(&rx))
+        {
             drive.speed.full = Some(full);
             drive.speed.limit = Some(limit.cast_signed().unsigned_abs());
         }
@@ -204,7 +208,7 @@ impl Gate {
     #[must_use]
     pub fn has_moved(&self, first_rx: u16) -> bool {
         let mut drives = self.drives.iter();
-        drives.any(|own| own.first_rx == first_rx && own.moved)
+        drives.any(|drive| drive.first_rx == first_rx && drive.moved)
     }
 
     /// Takes notice that the bus settings of this drive read as they did at first.
@@ -256,18 +260,18 @@ impl Gate {
 
     fn with(&mut self, first_rx: u16, act: impl FnOnce(&mut Guarded)) {
         let mut all = self.drives.iter_mut();
-        if let Some(drive) = all.find(|own| own.first_rx == first_rx) {
+        if let Some(drive) = all.find(|drive| drive.first_rx == first_rx) {
             act(drive);
         }
     }
 
     /// The registers of which this drive was told to send cycles since it was last seen to send none, with their longest intervals in ms.
     pub fn started(&self, first_rx: u16) -> impl Iterator<Item = (u8, u8)> + '_ {
-        let own = self
+        let drives = self
             .drives
             .iter()
-            .filter(move |own| own.first_rx == first_rx);
-        own.flat_map(|own| own.started.iter().copied())
+            .filter(move |drive| drive.first_rx == first_rx);
+        drives.flat_map(|drive| drive.started.iter().copied())
     }
 
     /// The cycles that were started and not stopped: identifier of the drive in the rig's file, register.

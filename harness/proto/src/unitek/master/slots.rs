@@ -65,9 +65,9 @@ impl Slots {
 
     /// The first frame of a cycle has come.
     pub(super) fn start(&mut self, now: Instant, register: u8, every: u8) {
-        let own = |slot: &Option<Slot>| slot.is_some_and(|slot| slot.register == register);
+        let is_same = |slot: &Option<Slot>| slot.is_some_and(|slot| slot.register == register);
         let free = |slot: &Option<Slot>| slot.is_none_or(|slot| slot.stopped.is_some());
-        let place = self.slots.iter().position(own);
+        let place = self.slots.iter().position(is_same);
         let place = place.or_else(|| self.slots.iter().position(Option::is_none));
         let place = place.or_else(|| self.slots.iter().position(free));
         if let Some(place) = place {

@@ -167,7 +167,7 @@ fn a_drive_that_moves() {
         denied(&mut gate, "201#510000"),
         missing(0x51, Missing::Motion)
     );
-    let places: Vec<_> = gate.places().map(|own| (own.rx, own.tx)).collect();
+    let places: Vec<_> = gate.places().map(|drive| (drive.rx, drive.tx)).collect();
     assert_eq!(
         places,
         [
@@ -182,9 +182,9 @@ fn a_drive_that_moves() {
     );
     // It may not have taken that.
     assert_eq!(denied(&mut gate, "210#680102"), None);
-    assert!(gate.places().any(|own| own.has_moved()));
+    assert!(gate.places().any(|drive| drive.has_moved()));
     gate.settled(0x201);
-    assert!(!gate.places().any(|own| own.has_moved()));
+    assert!(!gate.places().any(|drive| drive.has_moved()));
     // That it answers on its first identifiers does not show what 84 would store.
     assert!(gate.has_moved(0x201));
     assert_eq!(denied(&mut gate, "201#840000"), Some(Denial::LostDrive));
@@ -404,24 +404,24 @@ fn other_identifiers() {
 /// A drive may obey frames on the identifier in 88 (`second-identifiers`): they need the permissions of its first one, and lock nothing.
 #[test]
 fn second_identifiers() {
-    let mut own = gate(Limits {
+    let mut gate = gate(Limits {
         bus_settings: true,
         ..Limits::default()
     });
-    assert_eq!(denied(&mut own, "27E#3D1B00"), Some(Denial::Identifier));
-    assert_eq!(denied(&mut own, "201#887E020000"), None);
-    assert_eq!(denied(&mut own, "27E#3D1B00"), None);
+    assert_eq!(denied(&mut gate, "27E#3D1B00"), Some(Denial::Identifier));
+    assert_eq!(denied(&mut gate, "201#887E020000"), None);
+    assert_eq!(denied(&mut gate, "27E#3D1B00"), None);
     assert_eq!(
-        denied(&mut own, "27E#510000"),
+        denied(&mut gate, "27E#510000"),
         missing(0x51, Missing::Motion)
     );
-    assert_eq!(denied(&mut own, "27E#510400"), None);
+    assert_eq!(denied(&mut gate, "27E#510400"), None);
     assert_eq!(
-        denied(&mut own, "201#310000"),
+        denied(&mut gate, "201#310000"),
         missing(0x31, Missing::Motion)
     );
-    assert_eq!(denied(&mut own, "201#510400"), None);
-    assert_eq!(denied(&mut own, "201#310000"), None);
+    assert_eq!(denied(&mut gate, "201#510400"), None);
+    assert_eq!(denied(&mut gate, "201#310000"), None);
 }
 
 proptest! {

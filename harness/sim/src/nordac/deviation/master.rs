@@ -59,7 +59,9 @@ impl MasterDeviation {
                     asks(&mut parts);
                     parts.telegram()
                 });
-                MasterLine::of(&changed.map_or(octets.to_vec(), |own| own.encode().to_vec()))
+                MasterLine::of(
+                    &changed.map_or(octets.to_vec(), |telegram| telegram.encode().to_vec()),
+                )
             }
             How::Sends(sends) => {
                 let mut line = MasterLine::of(octets);

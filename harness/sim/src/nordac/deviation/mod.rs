@@ -105,8 +105,9 @@ impl Deviant {
     pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
         self.drive.hash_state(at, sum);
         if self.deviation.is_some() {
-            let own = &self.memory;
-            (&own.reply, own.inputs, own.outputs, own.answered % 5).hash(sum);
+            let memory = &self.memory;
+            (&memory.reply, memory.inputs, memory.outputs).hash(sum);
+            (memory.answered % 5).hash(sum);
         }
     }
 
@@ -156,12 +157,12 @@ impl Deviant {
         for _ in 0..heard.times {
             self.hear(at, &heard);
         }
-        let own = self.drive.take_reply();
+        let right = self.drive.take_reply();
         let delay = self.drive.slave().reply_delay_bits();
         let mut reply = Reply {
-            octets: own.map(|(_, octets)| octets.to_vec()).unwrap_or_default(),
+            octets: right.map(|(_, octets)| octets.to_vec()).unwrap_or_default(),
             delay: own_delay(
-                own.as_ref().map(|(ready, _)| *ready),
+                right.as_ref().map(|(ready, _)| *ready),
                 at,
                 self.drive.rate().bit_time().units(),
             )

@@ -54,8 +54,8 @@ impl Parts {
 
     /// The process data of a Data_Exchange.
     pub(super) fn image(&self, ppo: PpoType) -> Option<Image> {
-        let own = self.is(Service::DataExchange) && self.ssap.is_none();
-        own.then(|| Image::decode(ppo, &self.data)).flatten()
+        let exchanges = self.is(Service::DataExchange) && self.ssap.is_none();
+        exchanges.then(|| Image::decode(ppo, &self.data)).flatten()
     }
 
     /// Changes the process data of a Data_Exchange.
@@ -165,8 +165,8 @@ impl Reply {
     /// The inputs, if it is the reply to a Data_Exchange.
     pub(super) fn image(&self, ppo: PpoType) -> Option<Image> {
         let parts = self.parts()?;
-        let own = parts.dsap.is_none() && !parts.data.is_empty();
-        own.then(|| Image::decode(ppo, &parts.data)).flatten()
+        let exchanges = parts.dsap.is_none() && !parts.data.is_empty();
+        exchanges.then(|| Image::decode(ppo, &parts.data)).flatten()
     }
 
     /// Changes the inputs, if it is the reply to a Data_Exchange.

@@ -89,9 +89,7 @@ events! {
 /// A cell: what happened, and in which state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// The state before.
     pub(super) state: State,
-    /// What happened.
     pub(super) event: Event,
 }
 
@@ -131,7 +129,6 @@ impl Cell {
         cells.filter(|cell| cell.is_reachable())
     }
 
-    /// As a feature.
     pub(super) fn feature(self) -> Feature {
         let (section, words) = self.event.words();
         Feature::new(section, self.state.name(), words)

@@ -54,9 +54,9 @@ fn parameters(data: &[u8], notes: &mut Notebook<'_>) {
 
 fn configuration(data: &[u8], notes: &mut Notebook<'_>) {
     for octet in data {
-        if let Some(own) = CfgByte::decode(*octet) {
-            assert_eq!(own.encode(), Some(*octet));
-            assert!((1..=32).contains(&own.octets()));
+        if let Some(module) = CfgByte::decode(*octet) {
+            assert_eq!(module.encode(), Some(*octet));
+            assert!((1..=32).contains(&module.octets()));
         }
     }
     let Some(ppo) = PpoType::from_cfg(data) else {

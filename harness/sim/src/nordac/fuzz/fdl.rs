@@ -133,7 +133,7 @@ fn judge(line: &mut OctetSegment<Member<Box<Drive>>>, notes: &mut Notebook<'_>) 
     let ends = |octet: &LineByte| octet.at <= latest && octet.received == Some(ED);
     assert!(asked.iter().any(ends), "{sent:02X?} behind {asked:02X?}");
     let octets: Vec<u8> = sent.iter().filter_map(|octet| octet.sent).collect();
-    let own = line
+    let address = line
         .station(1)
         .drive()
         .map_or(0, |drive| drive.slave().address());
@@ -141,7 +141,10 @@ fn judge(line: &mut OctetSegment<Member<Box<Drive>>>, notes: &mut Notebook<'_>) 
         Decoded::Value { value, used } => {
             assert_eq!(used, octets.len(), "one reply");
             if let Telegram::Pdu(pdu) = &value {
-                assert!(!pdu.fc().is_request() && pdu.sa() == own, "{octets:02X?}");
+                assert!(
+                    !pdu.fc().is_request() && pdu.sa() == address,
+                    "{octets:02X?}"
+                );
             } else {
                 assert_eq!(octets, [SC]);
             }

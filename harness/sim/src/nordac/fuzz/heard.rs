@@ -7,17 +7,15 @@ use harness_proto::profibus::dp::DpState;
 
 /// A telegram, and what came of it.
 pub(super) struct Heard<'a> {
-    /// Its octets.
     pub(super) octets: &'a [u8],
     /// It is the last one again.
     pub(super) repeated: bool,
-    /// The own master before.
-    pub(super) own: Option<u8>,
+    /// The master of the slave before the telegram.
+    pub(super) master: Option<u8>,
     /// The state of the module before.
     pub(super) before: DpState,
     /// The state of the module behind it.
     pub(super) after: DpState,
-    /// The PPO type.
     pub(super) ppo: PpoType,
     /// The answer to its task.
     pub(super) executed: Option<Answer>,
@@ -34,23 +32,23 @@ impl Heard<'_> {
     fn event(&self, reply: Option<&[u8]>) -> (Event, Option<Event>) {
         let octets = self.octets;
         let data = octets.first() == Some(&0x68);
-        let own = octets.len() > 6 && self.own == Some(octets[5] & 0x7F);
+        let of_master = octets.len() > 6 && self.master == Some(octets[5] & 0x7F);
         let sap = octets.get(7).copied().unwrap_or(0);
         let exchange = data && octets.len() > 6 && (octets[4] | octets[5]) & 0x80 == 0;
         let event = match reply {
-            None if own && data && octets[4] & 0x80 != 0 && sap == 58 => Event::Control,
+            None if of_master && data && octets[4] & 0x80 != 0 && sap == 58 => Event::Control,
             None => Event::Silence,
             Some(_) if self.repeated => Event::Repeated,
             Some([0x10, _, _, 0, ..]) => Event::Status,
             Some([0x10, ..])
                 if exchange
-                    && own
+                    && of_master
                     && self.before == DpState::DataExch
                     && octets[6] & 0x0C == 0x0C =>
             {
                 Event::WrongLength
             }
-            Some([0xE5]) if sap == 61 => self.parameters(own),
+            Some([0xE5]) if sap == 61 => self.parameters(of_master),
             Some([0xE5]) if self.before == DpState::WaitPrm => Event::Refused,
             Some([0xE5]) if self.after == DpState::DataExch => Event::Configuration,
             Some([0xE5]) => Event::CfgFault,
@@ -62,10 +60,10 @@ impl Heard<'_> {
         (event, None)
     }
 
-    fn parameters(&self, own: bool) -> Event {
+    fn parameters(&self, of_master: bool) -> Event {
         let data = &self.octets[9..self.octets.len() - 2];
         match data {
-            _ if self.own.is_some() && !own => Event::Refused,
+            _ if self.master.is_some() && !of_master => Event::Refused,
             [status, _, _, _, _, _, _, ..] if status & 0xC0 != 0x80 => Event::Unlock,
             [_, _, _, _, _, _, _, ..] if self.after == DpState::WaitCfg => Event::Parameters,
             _ => Event::PrmFault,

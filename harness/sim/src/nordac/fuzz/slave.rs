@@ -285,7 +285,7 @@ impl Pair {
         let end = start + RATE.octet_time() * octets.len() as u64;
         self.pass(end, reached);
         let state = State::of(&self.drive);
-        let (own, ppo) = (self.drive.slave().master(), self.drive.slave().ppo());
+        let (master, ppo) = (self.drive.slave().master(), self.drive.slave().ppo());
         let delay = RATE.bit_time() * self.reference.delay();
         let damaged = damage.map(|place| usize::from(place) % octets.len().max(1));
         let mut at = start;
@@ -316,7 +316,7 @@ impl Pair {
         let heard = Heard {
             octets,
             repeated: damaged.is_none() && self.reference.repeated(),
-            own,
+            master,
             before: state.dp,
             after: self.drive.slave().state(),
             ppo,

@@ -250,13 +250,13 @@ impl ReferenceInverter {
     }
 
     fn value_at(&self, number: u16, element: u16, set: u16) -> i64 {
-        let parameter = PARAMETERS.iter().find(|own| own.number == number);
-        let set = if parameter.is_some_and(|own| own.has(Flag::Set)) {
+        let parameter = PARAMETERS.iter().find(|row| row.number == number);
+        let set = if parameter.is_some_and(|row| row.has(Flag::Set)) {
             set
         } else {
             0
         };
-        let default = parameter.map_or(0, |own| i64::from(own.default));
+        let default = parameter.map_or(0, |row| i64::from(row.default));
         self.values
             .get(&(number, element, set))
             .copied()
@@ -427,8 +427,8 @@ impl ReferenceInverter {
         if task > 9 {
             return (7, 201);
         }
-        let found = PARAMETERS.iter().find(|own| own.number == pke & 0x7FF);
-        let Some(parameter) = found.filter(|own| own.section != "5.6") else {
+        let found = PARAMETERS.iter().find(|row| row.number == pke & 0x7FF);
+        let Some(parameter) = found.filter(|row| row.section != "5.6") else {
             return (7, 0);
         };
         match self.execute(task, parameter, ind, pwe, ppo1) {

@@ -184,10 +184,10 @@ impl ReferenceSlave {
         if request.sa == 127 || (da != self.address && da != 127) {
             return None;
         }
-        let own = self.master == Some(request.sa);
+        let of_master = self.master == Some(request.sa);
         match request.fc & 0x0F {
             4 | 6 => {
-                let counts = own && self.state == 'D' && request.ssap.is_some();
+                let counts = of_master && self.state == 'D' && request.ssap.is_some();
                 if counts && request.dsap == Some(GLOBAL_CONTROL) {
                     self.feed_watchdog(at);
                     if request.data.len() == 2 {
@@ -269,15 +269,15 @@ impl ReferenceSlave {
             ..
         } = *request;
         let exchanges = self.state == 'D';
-        let own = self.master == Some(sa);
+        let of_master = self.master == Some(sa);
         match (dsap, ssap) {
-            (None, None) if exchanges && own => self.exchange(at, data),
+            (None, None) if exchanges && of_master => self.exchange(at, data),
             (None, _) | (_, None) => Reply::Rs,
             (Some(SET_PRM), _) => self.set_prm(at, sa, data),
-            (Some(CHK_CFG), _) => self.chk_cfg(own, data),
+            (Some(CHK_CFG), _) => self.chk_cfg(of_master, data),
             _ if !data.is_empty() => Reply::Rs,
             (Some(GET_CFG), _) => Reply::Data(Bytes::of(&[self.ppo.cfg()])),
-            (Some(SLAVE_DIAG), _) => Reply::Data(self.slave_diag(own)),
+            (Some(SLAVE_DIAG), _) => Reply::Data(self.slave_diag(of_master)),
             (Some(RD_INP), _) if exchanges => Reply::Data(self.read_inputs(at)),
             (Some(RD_OUTP), _) if exchanges => Reply::Data(self.outputs),
             _ => Reply::Rs,
@@ -329,11 +329,11 @@ impl ReferenceSlave {
         }
     }
 
-    fn chk_cfg(&mut self, own: bool, data: &[u8]) -> Reply {
+    fn chk_cfg(&mut self, of_master: bool, data: &[u8]) -> Reply {
         match self.state {
             'W' if self.p.chk_cfg_early.word() == "sc" => return Reply::Sc,
             'W' => return Reply::Rs,
-            _ if !own => return Reply::Rs,
+            _ if !of_master => return Reply::Rs,
             _ => self.cfg_fault = false,
         }
         if data != self.ppo.cfg() {
@@ -366,8 +366,8 @@ impl ReferenceSlave {
         self.due = None;
     }
 
-    fn slave_diag(&mut self, own: bool) -> Bytes {
-        if own || self.p.diag_flag_cleared_by.word() == "any-master" {
+    fn slave_diag(&mut self, of_master: bool) -> Bytes {
+        if of_master || self.p.diag_flag_cleared_by.word() == "any-master" {
             self.diagnosis_waits = false;
         }
         let bit = |set: bool, number: u8| u8::from(set) << number;

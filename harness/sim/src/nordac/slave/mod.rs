@@ -160,7 +160,7 @@ impl Slave {
     pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
         let agreed = &self.agreed;
         let watchdog = agreed.watchdog.as_ref();
-        let watchdog = watchdog.map(|own| (own.time, own.expires.since(at)));
+        let watchdog = watchdog.map(|watchdog| (watchdog.time, watchdog.expires.since(at)));
         (self.settings, self.ppo, self.state, self.min_tsdr).hash(sum);
         (agreed.master, agreed.group, agreed.sync, agreed.freeze).hash(sum);
         (watchdog, self.fcb, self.last_reply.as_deref()).hash(sum);
@@ -201,12 +201,12 @@ impl Slave {
 
     fn request(&mut self, at: Instant, pdu: &Pdu, inverter: &mut Inverter) -> Option<Buffer> {
         let function = pdu.fc().function()?;
-        let own = pdu.da() == self.address();
-        if function.is_sdn() && (own || pdu.da() == BROADCAST) {
+        let addressed = pdu.da() == self.address();
+        if function.is_sdn() && (addressed || pdu.da() == BROADCAST) {
             self.command(at, pdu, inverter);
             return None;
         }
-        if !own {
+        if !addressed {
             return None;
         }
         if function == Function::FdlStatus {

@@ -63,7 +63,7 @@ fn hex(octets: &[u8]) -> String {
     if octets.is_empty() {
         return "empty".to_owned();
     }
-    let all: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
+    let all: Vec<_> = octets.iter().map(|octet| format!("{octet:02X}")).collect();
     all.join(" ")
 }
 

@@ -34,7 +34,6 @@ const fn byte(address: u16, value: fn(u16) -> u16) -> Held {
     }
 }
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     wrong(
         "status-error-bit-missing",

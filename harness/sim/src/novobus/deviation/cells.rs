@@ -13,7 +13,6 @@ use harness_proto::time::Span;
 /// The code of a wrong checking byte (ND21 14.11.14).
 const WRONG_SUM: [u8; 2] = ErrorCode::NbChecksum.code().to_be_bytes();
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     // Commands that act without a right checking byte.
     wrong(

@@ -9,7 +9,6 @@ use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::memory::{Memory, in_range};
 use harness_proto::novobus::output::{Output, OutputChange};
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     wrong(
         "checksum-not-checked",

@@ -296,13 +296,13 @@ impl Device for Deviant {
         };
         let (bus_end, memory) = self.drive.inside();
         let monitored = || monitors(&self.deviations).unwrap_or_else(|| memory.monitors_time_out());
-        let own = bus_end.due(monitored).filter(waits);
+        let due = bus_end.due(monitored).filter(waits);
         let held = self.held.front().map(|&(due, _)| due);
-        match (own, held) {
-            (Some(Deadline::At(own)), Some(Deadline::At(held))) => {
-                Some(Deadline::At(own.min(held)))
+        match (due, held) {
+            (Some(Deadline::At(due)), Some(Deadline::At(held))) => {
+                Some(Deadline::At(due.min(held)))
             }
-            (own, None) => own,
+            (due, None) => due,
             (_, held) => held,
         }
     }

@@ -7,7 +7,6 @@ use harness_proto::novobus::check_sequence::SEQUENCE;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Span;
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     wrong(
         "ignores-parity-errors",

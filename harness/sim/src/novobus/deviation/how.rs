@@ -101,7 +101,6 @@ pub fn deviation(name: &str) -> Option<&'static Deviation> {
 pub(super) struct Moment {
     /// What the drive takes the byte for.
     pub(super) place: Place,
-    /// What arrived.
     pub(super) received: Received,
     /// Whether received + 1 is the answer (9.7).
     pub(super) increments: bool,
@@ -193,9 +192,7 @@ impl Moment {
 pub(super) struct Write {
     /// What the byte in hand is taken for.
     pub(super) place: Place,
-    /// Where.
     pub(super) address: u16,
-    /// What.
     pub(super) data: u8,
     /// The present contents.
     pub(super) old: u8,
@@ -212,7 +209,6 @@ pub(super) type Peek<'a> = &'a mut dyn FnMut(u16) -> u8;
 
 /// A cell in which the drive's program finds another value than the real one.
 pub(super) struct Held {
-    /// Its address.
     pub(super) address: u16,
     /// One byte or two.
     pub(super) word: bool,

@@ -8,7 +8,6 @@ use harness_proto::novobus::check_sequence::SEQUENCE;
 use harness_proto::novobus::command::Field;
 use harness_proto::novobus::error_mode::{Marks, OffendingZero, UPSTREAM_ZEROS};
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     passes(
         "bad-sync-byte-passed-on",

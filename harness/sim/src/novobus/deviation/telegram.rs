@@ -13,7 +13,6 @@ const BIT_4: u8 = 1 << 4;
 /// Bit 7 of a sync byte, which is 1.
 const BIT_7: u8 = 1 << 7;
 
-/// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     wrong(
         "swallows-synco",

@@ -153,12 +153,12 @@ fn send(ring: &mut [Place], now: Instant, mut cell: Cell) {
 
 /// The time of a drive is up (ND21 9.9). It sends zeros unasked, or it waits.
 fn silence(ring: &mut [Place], whose: usize, what: u8, now: Instant) {
-    let Some((own, behind)) = ring.get_mut(whose..).and_then(<[_]>::split_first_mut) else {
+    let Some((place, behind)) = ring.get_mut(whose..).and_then(<[_]>::split_first_mut) else {
         return;
     };
-    own.drive.time_out();
+    place.drive.time_out();
     if what & 8 != 0 {
-        own.silent_until = now + Span::from_millis(u64::from(what >> 4));
+        place.silent_until = now + Span::from_millis(u64::from(what >> 4));
         return;
     }
     for _ in 0..what >> 4 {

@@ -95,9 +95,9 @@ impl Reader {
 
     fn parameter(&mut self, byte: &mut u8) {
         let address = self.address;
-        let own =
+        let of_address =
             |place: &&mut Option<Begun>| place.as_ref().is_some_and(|one| one.address == address);
-        let Some(place) = self.begun.iter_mut().find(own) else {
+        let Some(place) = self.begun.iter_mut().find(of_address) else {
             let free = self.begun.iter_mut().find(|place| place.is_none());
             match (layout(*byte, ReadLongAnswer::default()), free) {
                 (Some(layout), Some(free)) => {

@@ -73,8 +73,8 @@ fn state_and_good(bus_end: &BusEnd, memory: &Cells, byte: u8) -> (State, Event) 
             } else {
                 State::Address
             };
-            let own = passed_on(byte) == ADDRESSED;
-            let event = if own {
+            let addressed = passed_on(byte) == ADDRESSED;
+            let event = if addressed {
                 Event::OwnAddress
             } else {
                 Event::OtherAddress
@@ -118,8 +118,8 @@ fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
     if !bus_end.short_address_valid() {
         return State::SyncNoAddress;
     }
-    let own = memory.peek(nd21::ram::BUS_ADDR) == ADDRESSED;
-    match (own, bus_end.command_begun()) {
+    let addressed = memory.peek(nd21::ram::BUS_ADDR) == ADDRESSED;
+    match (addressed, bus_end.command_begun()) {
         (false, false) => State::SyncOther,
         (false, true) => State::SyncOtherBegun,
         (true, false) => State::SyncOwn,

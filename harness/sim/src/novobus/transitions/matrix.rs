@@ -132,12 +132,12 @@ pub(super) static NUMBERS: [u16; CELLS] = {
         while turn < CELLS {
             let state = State::ALL[turn % State::ALL.len()];
             let event = Event::ALL[turn / State::ALL.len()];
-            let own = match without_time_out(state, event) {
+            let cell_group = match without_time_out(state, event) {
                 true if state.index() >= State::ErrorZeros.index() => 0,
                 true => 1,
                 false => 2,
             };
-            if own == group && rule_against(state, event).is_none() {
+            if cell_group == group && rule_against(state, event).is_none() {
                 numbers[state.index() * Event::ALL.len() + event.index()] = number;
                 number += 1;
             }

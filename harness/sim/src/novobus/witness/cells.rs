@@ -79,7 +79,7 @@ fn is_of_a_function(address: u16) -> bool {
         ram::N_RAMPE_PLUS..=ram::N_RAMPE_MINUS + 1,
         ram::D_LAGE..=ram::D_LAGE + 1,
     ];
-    CELLS.iter().any(|own| own.contains(&address))
+    CELLS.iter().any(|cells| cells.contains(&address))
 }
 
 /// Whether one of these commands is ResetH8 (10.5).
@@ -128,8 +128,8 @@ pub(super) fn executed(
     let mut section = "14.2.1";
     let mut loose = Vec::new();
     for command in executed {
-        let (own, cells) = meant(command, before);
-        section = own;
+        let (of_command, cells) = meant(command, before);
+        section = of_command;
         for address in cells {
             let Some(place) = place(address) else {
                 continue;
@@ -165,7 +165,7 @@ pub(super) fn executed(
             is[place],
             executed
                 .last()
-                .map_or_else(|| "a byte".to_owned(), |own| format!("{own:02X?}")),
+                .map_or_else(|| "a byte".to_owned(), |command| format!("{command:02X?}")),
             before[place],
             must[place],
         );
@@ -183,7 +183,7 @@ fn differing(must: &Image, is: &Image, loose: &[u16]) -> Option<usize> {
     let mut otherwise = pairs.filter(|(place, (must, is))| {
         let free = match address(*place) {
             ram::FLAGS2 => OWN_BITS,
-            own if loose.contains(&own) => 0xFF,
+            cell if loose.contains(&cell) => 0xFF,
             _ => 0,
         };
         (**must ^ **is) & !free != 0
@@ -215,9 +215,9 @@ pub(super) fn at_start(drive: &Drive) -> Option<String> {
     let is = image(drive);
     let mut must: Image = [0; 0x280];
     for link in LINKS {
-        for own in 0..link.size {
-            if let Some(place) = place(link.ram + u16::from(own)) {
-                must[place] = drive.cells().eeprom()[usize::from(link.eeprom + own)];
+        for offset in 0..link.size {
+            if let Some(place) = place(link.ram + u16::from(offset)) {
+                must[place] = drive.cells().eeprom()[usize::from(link.eeprom + offset)];
             }
         }
     }
@@ -231,7 +231,7 @@ pub(super) fn at_start(drive: &Drive) -> Option<String> {
     let pairs = must.iter().zip(&is).zip(MASTERS.iter());
     let place = pairs
         .map(|((must, is), mask)| (must ^ is) & mask)
-        .position(|own| own != 0)?;
+        .position(|difference| difference != 0)?;
     let (address, must, is) = (address(place), must[place], is[place]);
     Some(format!(
         "cell {address:04X} holds {is:02X} when the drive starts, it must hold {must:02X}"

@@ -67,20 +67,20 @@ pub(super) fn done(job: Job, is: &Image, cells: &Cells) -> Option<Result<(), Str
     let ill = match job {
         _ if control & must == 0 => Some(format!("EEPROMcontrol shows {control:02X}")),
         Job::Read(address) => {
-            let (read, own) = (at(is, ram::EEPROM_BUFFER), stands(address));
-            (read != own)
-                .then(|| format!("{address:02X} was read as {read:02X} and holds {own:02X}"))
+            let (read, stored) = (at(is, ram::EEPROM_BUFFER), stands(address));
+            (read != stored)
+                .then(|| format!("{address:02X} was read as {read:02X} and holds {stored:02X}"))
         }
         Job::Write(address, data) => {
             let free = eeprom::cell_at(address).is_some_and(|cell| cell.access == Access::Write);
-            let own = stands(address);
-            let otherwise = free && own != data;
-            otherwise.then(|| format!("{address:02X} holds {own:02X}, {data:02X} was written"))
+            let stored = stands(address);
+            let otherwise = free && stored != data;
+            otherwise.then(|| format!("{address:02X} holds {stored:02X}, {data:02X} was written"))
         }
         Job::Parameters => (0..PARAMETER_COUNT).find_map(|n| {
             let place = u16::from(EE_PARAMETERS) + n;
-            let own = cells.eeprom()[usize::from(place)];
-            (own != at(is, PARAMETERS + n)).then(|| format!("{place:02X} holds {own:02X}"))
+            let stored = cells.eeprom()[usize::from(place)];
+            (stored != at(is, PARAMETERS + n)).then(|| format!("{place:02X} holds {stored:02X}"))
         }),
     };
     Some(ill.map_or(Ok(()), |ill| {

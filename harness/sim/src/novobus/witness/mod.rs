@@ -123,9 +123,9 @@ impl Witness {
     /// The reference knows what the drive's cells hold.
     fn teach(&mut self) {
         let now = image(&self.drive);
-        for (address, (own, known)) in (0xFD80..=0xFFFF).zip(now.iter().zip(self.known())) {
-            if *own != known {
-                self.bus.poke(address, *own);
+        for (address, (byte, known)) in (0xFD80..=0xFFFF).zip(now.iter().zip(self.known())) {
+            if *byte != known {
+                self.bus.poke(address, *byte);
             }
         }
         self.last = now;
@@ -156,7 +156,7 @@ impl Witness {
         }
         let silent = self.last_byte.map(|at| now.since(at));
         let monitored = self.monitored();
-        if monitored && self.time_out.is_none() && silent.is_some_and(|own| own > TIME_OUT.1) {
+        if monitored && self.time_out.is_none() && silent.is_some_and(|time| time > TIME_OUT.1) {
             let about = "20 ms of silence, and no time-out was detected".to_owned();
             self.complain(now, ("9.9", "time-out"), about);
         }
@@ -221,11 +221,11 @@ impl Device for Witness {
         let executed = self.bus.take_executed();
         let detects = !was_in_error && self.bus.in_error();
         let code = detects.then(|| {
-            let own = [
+            let code = [
                 self.bus.peek(ram::ERRORCODE),
                 self.bus.peek(ram::ERRORCODE + 1),
             ];
-            code_of(received.error, u16::from_be_bytes(own))
+            code_of(received.error, u16::from_be_bytes(code))
         });
         let step = self.drive.receive(now, received);
         self.last_sent = now;
@@ -261,7 +261,7 @@ impl Device for Witness {
         let silent = self.last_byte.map(|at| now.since(at));
         let due = self.monitored()
             && self.time_out.is_none()
-            && silent.is_some_and(|own| (TIME_OUT.0..=TIME_OUT.1).contains(&own));
+            && silent.is_some_and(|time| (TIME_OUT.0..=TIME_OUT.1).contains(&time));
         self.before(now);
         let was_in_error = self.bus.in_error();
         let step = self.drive.handle_deadline(now);

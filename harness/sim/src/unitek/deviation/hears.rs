@@ -17,8 +17,8 @@ pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Hears):
         }
     };
     "hears-29-bits" "4.1" "An identifier of 29 bits with the same number is the drive's own." |h| {
-        let own = Id::extended(h.rx.into());
-        if own == Some(h.frame.id()) && !h.frame.is_remote() { h.addressed() } else { h.as_it_is() }
+        let extended = Id::extended(h.rx.into());
+        if extended == Some(h.frame.id()) && !h.frame.is_remote() { h.addressed() } else { h.as_it_is() }
     };
     "hears-its-neighbour" "3.1" "The drive also obeys the next higher identifier." |h| {
         let next = h.frame.id() == Id::base(h.rx + 1).unwrap_or(h.frame.id());
@@ -103,7 +103,7 @@ pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Hears):
     "interval-at-most-100" "ex 9" "An interval is 100 ms at most." |h| h.with_interval(|every| every.min(100));
     "four-cycles" "ex 9" "The table of cycles has 4 places." |h| match h.request {
         Some(Request::Cycle { register, .. })
-            if h.drive.running_cycles().count() >= 4 && h.drive.running_cycles().all(|(own, _)| own != register) =>
+            if h.drive.running_cycles().count() >= 4 && h.drive.running_cycles().all(|(running, _)| running != register) =>
         {
             Vec::new()
         }

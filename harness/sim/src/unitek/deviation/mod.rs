@@ -104,7 +104,7 @@ impl Hearing<'_> {
     /// Writes this in place of what is written to `register`; other frames stay as they are.
     fn writing(&self, register: u8, value: impl FnOnce(u16) -> u16) -> Vec<Frame> {
         match self.written() {
-            Some((own, old)) if own == register => self.instead(Request::Write {
+            Some((written, old)) if written == register => self.instead(Request::Write {
                 register,
                 data: Data::Short(value(old)),
             }),
@@ -115,7 +115,7 @@ impl Hearing<'_> {
     /// Does not hear writes to `register`.
     fn without_writes(&self, register: u8) -> Vec<Frame> {
         match self.written() {
-            Some((own, _)) if own == register => Vec::new(),
+            Some((written, _)) if written == register => Vec::new(),
             _ => self.as_it_is(),
         }
     }
@@ -208,12 +208,12 @@ impl Deviant {
     /// See [`Drive::state`].
     #[must_use]
     pub fn state(&self) -> u64 {
-        let own = self.drive.state();
+        let of_drive = self.drive.state();
         match self.deviation {
-            None => own,
+            None => of_drive,
             Some(deviation) => {
                 let mut state = DefaultHasher::new();
-                (own, self.part).hash(&mut state);
+                (of_drive, self.part).hash(&mut state);
                 if deviation.counts() {
                     (self.memory.heard % 5, self.memory.sent % 5).hash(&mut state);
                 }
@@ -267,7 +267,9 @@ impl Deviant {
             return;
         };
         self.memory.sent += 1;
-        if self.deviation.is_some_and(|own| own.name == REPEATING)
+        if self
+            .deviation
+            .is_some_and(|deviation| deviation.name == REPEATING)
             && let Ok(reply) = Reply::decode(&waiting.frame, tx)
         {
             self.memory

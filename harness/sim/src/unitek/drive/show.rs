@@ -22,7 +22,7 @@ impl Drive {
         let levels = self
             .eeprom
             .each_ref()
-            .map(|own| own.as_ref().map(Arc::as_ptr));
+            .map(|level| level.as_ref().map(Arc::as_ptr));
         (levels, self.identifiers, self.second).hash(&mut state);
         (self.on_bus, self.control, &self.inputs, self.homing).hash(&mut state);
         (self.calibrated, self.timed_out, self.released).hash(&mut state);
@@ -36,7 +36,7 @@ impl Drive {
         }
         self.cycles
             .state(self.scans)
-            .for_each(|own| own.hash(&mut state));
+            .for_each(|cycle| cycle.hash(&mut state));
         state.finish()
     }
 

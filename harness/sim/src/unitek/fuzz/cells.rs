@@ -29,7 +29,6 @@ pub(super) struct State {
     pub(super) closed: bool,
     /// E2.
     pub(super) ready: bool,
-    /// The cycles.
     pub(super) cycles: Running,
 }
 
@@ -141,9 +140,7 @@ events! {
 /// A cell: what happened, and in which state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// The state before.
     pub(super) state: State,
-    /// What happened.
     pub(super) event: Event,
 }
 
@@ -190,7 +187,6 @@ impl Cell {
         cells.filter(|cell| cell.is_reachable())
     }
 
-    /// As a feature.
     #[must_use]
     pub(super) fn feature(self) -> Feature {
         let (section, words) = self.event.words();

@@ -209,12 +209,12 @@ impl Pair {
 
     fn happens(&mut self, what: What, reached: &mut impl FnMut(Cell)) {
         let rx = self.drive.identifiers().0;
-        let own = Id::base(rx).or(Id::base(DEFAULT_RX));
-        let frame = match (what, own) {
-            (What::ToDrive(data, len), Some(own)) => Frame::new(own, &data[..len]),
+        let id = Id::base(rx).or(Id::base(DEFAULT_RX));
+        let frame = match (what, id) {
+            (What::ToDrive(data, len), Some(id)) => Frame::new(id, &data[..len]),
             (What::ToDelivered(data, len), _) => Frame::base(DEFAULT_RX, &data[..len]),
             (What::Elsewhere(id, data, len), _) => Frame::new(id, &data[..len]),
-            (What::Remote(len), Some(own)) => Frame::remote(own, len),
+            (What::Remote(len), Some(id)) => Frame::remote(id, len),
             (What::Switch(number, on), _) => return self.switch(number, on, reached),
             (What::Force(number, raw), _) => return self.force(number, raw, reached),
             (What::Time(millis), _) => return self.wait(millis, reached),
@@ -286,7 +286,7 @@ impl Pair {
     /// What a frame is to the drive in its present state.
     fn event(&self, request: Result<Request, Ignored>) -> Event {
         let cycles = || self.drive.running_cycles();
-        let has_cycle = |register| cycles().any(|(own, _)| own == register);
+        let has_cycle = |register| cycles().any(|(running, _)| running == register);
         match request {
             Err(Ignored::Extended | Ignored::OtherIdentifier | Ignored::OtherRate) => {
                 Event::Foreign
@@ -395,7 +395,7 @@ impl Pair {
         let (drive, reference) = (&self.drive, &self.reference);
         if drive.held() != reference.held() {
             let pairs = drive.held().iter().zip(reference.held());
-            let differing = (0..=u8::MAX).zip(pairs).find(|(_, (own, its))| own != its);
+            let differing = (0..=u8::MAX).zip(pairs).find(|(_, (is, must))| is != must);
             panic!("register {differing:02X?} holds something else in the reference model");
         }
         for number in SHOWN {

@@ -310,25 +310,25 @@ impl Play {
         let writes = matches!(request, Request::Write { .. } | Request::Stop { .. });
         open.writes += usize::from(writes);
         let asks = match (open.job, request) {
-            (Job::Read { register }, Request::Read { register: own }) => register == own,
+            (Job::Read { register }, Request::Read { register: asked }) => register == asked,
             (
                 Job::Write { register, data },
                 Request::Write {
-                    register: own,
+                    register: asked,
                     data: its,
                 },
-            ) => (register, data) == (own, its),
+            ) => (register, data) == (asked, its),
             // 3D cannot be written: what is written to it is a request for sending.
             (Job::Write { register: 0x3D, .. }, _) => true,
-            (Job::Write { register, .. }, Request::Read { register: own }) => register == own,
+            (Job::Write { register, .. }, Request::Read { register: asked }) => register == asked,
             (
                 Job::Cycle { register, every },
                 Request::Cycle {
-                    register: own,
+                    register: asked,
                     every: its,
                 },
-            ) => (register, every) == (own, its),
-            (Job::Stop { register }, Request::Stop { register: own }) => register == own,
+            ) => (register, every) == (asked, its),
+            (Job::Stop { register }, Request::Stop { register: asked }) => register == asked,
             (Job::StartUp { .. }, Request::Read { register }) => {
                 matches!(register, 0xE2 | 0xE8 | 0x51 | 0x31 | 0x90)
             }

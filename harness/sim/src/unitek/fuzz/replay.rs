@@ -9,17 +9,14 @@ use harness_proto::unitek::Reply;
 /// Inputs of a drive that were changed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Change {
-    /// The drive.
     pub(super) number: usize,
     /// How many frames were in the record.
     pub(super) behind: usize,
-    /// When.
     pub(super) at: Instant,
     /// The inputs from then on.
     pub(super) inputs: Inputs,
 }
 
-/// The drive.
 #[derive(Debug)]
 pub(super) struct Replay {
     /// Its place on the segment.
@@ -96,7 +93,7 @@ impl Replay {
         if let Some(waiting) = self
             .drive
             .wants()
-            .filter(|own| undisturbed && own.ready <= line.start)
+            .filter(|waiting| undisturbed && waiting.ready <= line.start)
         {
             let wins = waiting.frame.arbitration() < line.frame.arbitration();
             assert!(!wins, "{line:?} went before {}", waiting.frame);

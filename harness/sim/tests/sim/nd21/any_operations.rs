@@ -260,8 +260,8 @@ fn any_operations_keep_the_invariants() {
     let seen = RefCell::new(Seen::default());
     let result = runner.run(
         &(properties(), eeprom, operations),
-        |(own, eeprom, list)| {
-            play(own, eeprom, &list, &mut seen.borrow_mut());
+        |(choices, eeprom, list)| {
+            play(choices, eeprom, &list, &mut seen.borrow_mut());
             Ok(())
         },
     );

@@ -34,7 +34,7 @@ fn control_word() -> impl Strategy<Value = u16> {
         2 => any::<u16>(),
     ];
     let set = prop_oneof![6 => Just(0_u16), 1 => 0..4_u16];
-    let direction = prop_oneof![4 => Just(0_u16), 1 => (0..4_u16).prop_map(|own| own << 11)];
+    let direction = prop_oneof![4 => Just(0_u16), 1 => (0..4_u16).prop_map(|bits| bits << 11)];
     (word, set, direction).prop_map(|(word, set, direction)| word | set << 14 | direction)
 }
 
@@ -58,10 +58,10 @@ const NOT_CHANGED: [u16; 11] = [
 fn task() -> impl Strategy<Value = Step> {
     let numbers: Vec<u16> = harness_proto::nordac::PARAMETERS
         .iter()
-        .map(|own| own.number)
+        .map(|parameter| parameter.number)
         .collect();
     let number = prop_oneof![20 => proptest::sample::select(numbers), 1 => 0..0x800_u16];
-    let ind = prop_oneof![4 => Just(0_u16), 4 => (0..4_u16).prop_map(|set| set << 8), 2 => (0..26_u16).prop_map(|own| own << 8), 1 => any::<u16>()];
+    let ind = prop_oneof![4 => Just(0_u16), 4 => (0..4_u16).prop_map(|set| set << 8), 2 => (0..26_u16).prop_map(|element| element << 8), 1 => any::<u16>()];
     let value = prop_oneof![4 => 0..4_u32, 4 => 0..1_500_u32, 1 => any::<u32>()];
     (0..16_u16, number, ind, value, any::<bool>()).prop_map(|(ak, number, ind, value, ppo1)| {
         let open = NOT_CHANGED.contains(&number) && matches!(ak, 2 | 3 | 7 | 8);
@@ -124,14 +124,14 @@ fn agrees_with_the_reference() {
                 (1615, 20),
             ];
             // Four sets have the same values.
-            let mut own = setup(8, &[]);
+            let mut settings = setup(8, &[]);
             for (number, value) in parameters {
                 for set in 0..4 {
                     let index = harness_proto::nordac::pkw::Index { element: 0, set };
-                    own.parameters.push((number, index, value));
+                    settings.parameters.push((number, index, value));
                 }
             }
-            let mut inverter = Inverter::new(&own, Instant::START);
+            let mut inverter = Inverter::new(&settings, Instant::START);
             let mut plain: Vec<(u16, i64)> = parameters
                 .iter()
                 .map(|&(number, value)| (number, value.into()))
@@ -170,9 +170,11 @@ fn agrees_with_the_reference() {
                         reference.cause(code);
                     }
                 }
-                let own = inverter.inputs(now);
-                states.borrow_mut().insert((own.zsw & 0x6F, own.hiw != 0));
-                let seen = (own.zsw, own.hiw, own.pzd4);
+                let inputs = inverter.inputs(now);
+                states
+                    .borrow_mut()
+                    .insert((inputs.zsw & 0x6F, inputs.hiw != 0));
+                let seen = (inputs.zsw, inputs.hiw, inputs.pzd4);
                 let expected = (reference.zsw(), reference.hiw(), reference.actual_2());
                 prop_assert_eq!(
                     seen,

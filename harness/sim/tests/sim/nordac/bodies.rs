@@ -33,12 +33,12 @@ fn fdl_takes_damaged_telegrams() {
         for (place, other, what, idle) in all {
             for (at, octet) in request.into_iter().enumerate() {
                 let harm = if at == place { what } else { 0 };
-                let own = if at == place && what == 31 {
+                let octet = if at == place && what == 31 {
                     other
                 } else {
                     octet
                 };
-                pairs.extend([harm | if at == 0 { idle } else { 0 }, own]);
+                pairs.extend([harm | if at == 0 { idle } else { 0 }, octet]);
             }
         }
         fuzz::fdl(&pairs);

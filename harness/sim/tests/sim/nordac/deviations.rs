@@ -237,13 +237,13 @@ fn conversation<D: LineStation>(
                 }
             }
             "control" => {
-                let own = octets(rest);
-                desk.control(own[0], own[1]);
+                let pair = octets(rest);
+                desk.control(pair[0], pair[1]);
             }
             "all" => {
-                let own = octets(rest);
+                let pair = octets(rest);
                 let slave = std::mem::replace(&mut desk.slave, 127);
-                desk.control(own[0], own[1]);
+                desk.control(pair[0], pair[1]);
                 desk.slave = slave;
             }
             "fc" => {
@@ -267,7 +267,7 @@ fn conversation<D: LineStation>(
 fn raw<D: LineStation>(desk: &mut Desk<D>, word: &str, rest: &str) {
     let (marks, digits): (Vec<&str>, Vec<&str>) = rest
         .split(' ')
-        .partition(|own| own.starts_with(['p', 's', 'g']));
+        .partition(|word| word.starts_with(['p', 's', 'g']));
     let mut all: Vec<Octet> = octets(&digits.join(" "))
         .into_iter()
         .map(Octet::from)

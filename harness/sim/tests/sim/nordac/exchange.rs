@@ -109,14 +109,14 @@ fn answers_in_order() {
 #[test]
 fn open_points_of_the_exchange() {
     for latency in 1..6_usize {
-        let own = with(setup(8, &[]), "pkw-latency", &latency.to_string());
-        let mut desk = Desk::new(&own);
+        let settings = with(setup(8, &[]), "pkw-latency", &latency.to_string());
+        let mut desk = Desk::new(&settings);
         desk.start("F3 F1");
         let data = ppo1("14B2 0000 0000 0000", "0000", "0000");
         let first = (0..10).position(|_| answer(&desk.inputs(&data)) != "0000 0000 0000 0000");
         assert_eq!(first, Some(latency));
-        let own = with(setup(8, &[(1621, 2)]), "pzd-latency", &latency.to_string());
-        let mut desk = Desk::new(&own);
+        let settings = with(setup(8, &[(1621, 2)]), "pzd-latency", &latency.to_string());
+        let mut desk = Desk::new(&settings);
         desk.start("F3 F1");
         let data = ppo1("0000 0000 0000 0000", "047E", "0000");
         let first = (0..10).position(|_| words(&desk.inputs(&data)).starts_with("0B31"));

@@ -169,9 +169,9 @@ fn collisions() {
     }
     line.run_until(Instant::START + Span::from_millis(1));
     for place in 0..2 {
-        let own = line.record(place)[0];
-        assert_eq!(own.error, Some(LineError::Framing));
-        assert_eq!(own.at, Instant::START + rate.bit_time() * 33 + octet);
+        let heard = line.record(place)[0];
+        assert_eq!(heard.error, Some(LineError::Framing));
+        assert_eq!(heard.at, Instant::START + rate.bit_time() * 33 + octet);
     }
 }
 
@@ -181,7 +181,10 @@ fn the_record() {
     let (_, desk) = faulty(1, 2, LineFault::Octet(LinkFault::Insert(0x55)));
     let bit = desk.rate.bit_time();
     let record = desk.line.record(1);
-    let seen: Vec<_> = record.iter().map(|own| (own.sent, own.received)).collect();
+    let seen: Vec<_> = record
+        .iter()
+        .map(|octet| (octet.sent, octet.received))
+        .collect();
     assert_eq!(
         seen[..3],
         [

@@ -176,7 +176,7 @@ fn replies_keep_the_shortest_delay() {
             .line
             .record(MASTER)
             .iter()
-            .map(|own| own.at)
+            .map(|octet| octet.at)
             .collect();
         let mut last = Instant::START;
         let mut replies = 0;

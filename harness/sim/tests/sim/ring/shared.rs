@@ -98,8 +98,8 @@ fn case(random: &mut Random, shared: &mut SharedRing, start: &Ring<Drive>, befor
     let mut passage: Passage = shared.send(before, &opening);
     for all in faults.chunk_by(|a, b| a.0 == b.0) {
         let link = all[0].0;
-        let own = all.iter().map(|(_, byte, fault)| (*byte, *fault));
-        let became = shared.disturb(before, &passage, link, own);
+        let disturbed = all.iter().map(|(_, byte, fault)| (*byte, *fault));
+        let became = shared.disturb(before, &passage, link, disturbed);
         passage = shared.follow(before, &passage, link, became.expect("a link"));
     }
     assert_eq!(shared.bytes(passage.heard()), heard);

@@ -56,7 +56,7 @@ impl Bench {
         for _ in 0..10_000 {
             self.run(1);
             let ended = self.events.iter().find_map(|event| match event {
-                Event::Ended { id: own, outcome } if *own == id => Some(*outcome),
+                Event::Ended { id: ended, outcome } if *ended == id => Some(*outcome),
                 _ => None,
             });
             if let Some(outcome) = ended {

@@ -70,12 +70,10 @@ impl DeviantMaster {
         }
     }
 
-    /// The master inside.
     pub(crate) fn inner(&self) -> &Master {
         &self.inner
     }
 
-    /// The master inside.
     pub(crate) fn inner_mut(&mut self) -> &mut Master {
         &mut self.inner
     }

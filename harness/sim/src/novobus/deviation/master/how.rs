@@ -32,7 +32,6 @@ pub(super) enum Sending {
 /// A byte that has come back, beside the one that it is the answer to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Heard {
-    /// What came.
     pub(super) received: Received,
     /// What the master inside has sent for it.
     pub(super) spoken: Spoken,
@@ -53,7 +52,6 @@ impl Heard {
 /// What a wrong master keeps in mind.
 #[derive(Clone, Debug)]
 pub(super) struct Notes {
-    /// Its ring.
     pub(super) ring: RingSize,
     /// Jobs that have not ended.
     pub(super) open: Vec<(JobId, Job)>,

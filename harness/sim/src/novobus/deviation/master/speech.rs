@@ -31,7 +31,6 @@ pub(super) enum What {
 /// A byte as the master inside sends it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spoken {
-    /// The byte.
     pub(super) byte: u8,
     /// What it is for.
     pub(super) what: What,

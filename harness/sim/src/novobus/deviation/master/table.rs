@@ -14,7 +14,6 @@ use harness_proto::novobus::sync::{Addressing, SYNCO};
 const NEXT: u8 = 1 << 6;
 const SHORT: u8 = 1 << 5;
 
-/// The table.
 pub(super) static DEVIATIONS: &[MasterDeviation] = &[
     wrong(
         "numbers-from-the-front",

@@ -115,8 +115,8 @@ impl<'w> Judge<'w> {
                     id.number()
                 );
                 let wrong = || Lie::new("11.6", text);
-                let own = self.jobs.iter_mut().find(|(own, ..)| own == id);
-                let (_, order, ended) = own.ok_or_else(wrong)?;
+                let open = self.jobs.iter_mut().find(|(known, ..)| known == id);
+                let (_, order, ended) = open.ok_or_else(wrong)?;
                 if std::mem::replace(ended, true) {
                     let text = format!("it told twice of the end of job {}", id.number());
                     return Err(Lie::new("11.6", text));

@@ -26,7 +26,6 @@ pub(super) enum Back {
     Sequence,
 }
 
-/// What was read.
 #[derive(Debug, Default)]
 pub(super) struct Read {
     /// What must come back, byte by byte.
@@ -40,11 +39,11 @@ pub(super) struct Read {
 impl Read {
     /// Whether every command is one of those asked for, and was not sent too often.
     pub(super) fn asked_for(&self, asked: &[(u8, Command)]) -> Result<(), Lie> {
-        for own in &self.commands {
-            let asked = asked.iter().filter(|asked| *asked == own).count();
-            let sent = self.commands.iter().filter(|sent| *sent == own).count();
+        for command in &self.commands {
+            let asked = asked.iter().filter(|asked| *asked == command).count();
+            let sent = self.commands.iter().filter(|sent| *sent == command).count();
             if sent > asked * (1 + self.sequences) {
-                let (drive, command) = own;
+                let (drive, command) = command;
                 let text = format!(
                     "it sent {command:?} to drive {drive} {sent} times, asked for {asked} times"
                 );
@@ -102,9 +101,9 @@ pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
                 _ if index < process_data => Back::Data(None),
                 None => Back::Byte(byte),
                 Some(drive) => {
-                    let own = begun.entry(drive).or_default();
-                    own.push(byte);
-                    let (back, whole) = parameter(drive, own)?;
+                    let bytes = begun.entry(drive).or_default();
+                    bytes.push(byte);
+                    let (back, whole) = parameter(drive, bytes)?;
                     if let Some(command) = whole {
                         read.commands.push((drive, command));
                         begun.remove(&drive);
