@@ -52,17 +52,17 @@ impl Sharing<'_> {
     ) -> Result<(), E> {
         let from = singles.partition_point(|single| single.link < link);
         let to = singles.partition_point(|single| single.link <= link);
-        let (before, own) = (&singles[..from], &singles[from..to]);
+        let (before, on_link) = (&singles[..from], &singles[from..to]);
         let wanted = |place: &usize| wanted(from + place);
-        self.pairs_within(own, &wanted, found)?;
+        self.pairs_within(on_link, &wanted, found)?;
         // Faults that last longer have a longer opening.
         let mut by_length: BTreeMap<usize, Vec<Injected>> = BTreeMap::new();
-        for place in (0..own.len()).filter(&wanted) {
-            let lasts = self.lasts(&own[place], None);
-            by_length.entry(lasts).or_default().push(own[place]);
+        for place in (0..on_link.len()).filter(&wanted) {
+            let lasts = self.lasts(&on_link[place], None);
+            by_length.entry(lasts).or_default().push(on_link[place]);
         }
-        for own in by_length.values() {
-            self.pairs_across(before, own, found)?;
+        for alike in by_length.values() {
+            self.pairs_across(before, alike, found)?;
         }
         Ok(())
     }
@@ -70,18 +70,18 @@ impl Sharing<'_> {
     /// Pairs of faults of one link, of which the second is `wanted`.
     fn pairs_within<E>(
         &mut self,
-        own: &[Injected],
+        on_link: &[Injected],
         wanted: &impl Fn(&usize) -> bool,
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        for place in (0..own.len()).filter(wanted) {
-            let second = &own[place];
-            for first in &own[..place] {
+        for place in (0..on_link.len()).filter(wanted) {
+            let second = &on_link[place];
+            for first in &on_link[..place] {
                 self.sound(self.lasts(first, Some(second)));
             }
             let mark = self.mark();
             let (mut forks, mut all) = (Places::new(), Forks::new());
-            for first in &own[..place] {
+            for first in &on_link[..place] {
                 let case = CaseFaults {
                     first: *first,
                     second: Some(*second),
@@ -97,14 +97,14 @@ impl Sharing<'_> {
         Ok(())
     }
 
-    /// Pairs of a fault of `before` and one of `own`, which are on one link behind and last equally long.
+    /// Pairs of a fault of `before` and one of `alike`, which are on one link behind and last equally long.
     fn pairs_across<E>(
         &mut self,
         before: &[Injected],
-        own: &[Injected],
+        alike: &[Injected],
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Some(any) = own.first() else {
+        let Some(any) = alike.first() else {
             return Ok(());
         };
         let mut places: HashMap<Front, usize> = HashMap::new();
@@ -127,7 +127,7 @@ impl Sharing<'_> {
             let arriving = self.arriving(front, any.link);
             let mut all = match known.remove(&arriving) {
                 Some(all) => all,
-                None => self.forks(front, own),
+                None => self.forks(front, alike),
             };
             for (fork, case, _) in &mut all {
                 *fork = fork.of(front);
@@ -143,9 +143,9 @@ impl Sharing<'_> {
     }
 
     /// How a front forks by each of these faults of one link.
-    fn forks(&mut self, front: Front, own: &[Injected]) -> Forks {
+    fn forks(&mut self, front: Front, faults: &[Injected]) -> Forks {
         let (mut forks, mut all) = (Places::new(), Forks::new());
-        for second in own {
+        for second in faults {
             if let Some(fork) = self.fork(front, second.link, [second]) {
                 let case = CaseFaults {
                     first: *second,

@@ -69,9 +69,9 @@ struct Play<'a, W> {
 
 /// What came back for `sent`, without the SYNCO that were under way before it.
 fn behind_synco<'a>(heard: &'a [Received], sent: &[u8]) -> &'a [Received] {
-    let own = sent.iter().take_while(|byte| **byte == SYNCO).count();
+    let expected = sent.iter().take_while(|byte| **byte == SYNCO).count();
     let all = heard.iter().take_while(|byte| byte.is(SYNCO)).count();
-    &heard[all.saturating_sub(own)..]
+    &heard[all.saturating_sub(expected)..]
 }
 
 impl ByManual {
@@ -112,7 +112,6 @@ impl ByManual {
         })
     }
 
-    /// The conversation.
     #[must_use]
     pub(crate) fn answers(&self) -> &Answers {
         &self.answers

@@ -111,7 +111,6 @@ pub(crate) enum Wrong {
     /// A cell of a drive.
     Cell {
         drive: u8,
-        /// Which cell.
         address: u16,
         /// What it holds.
         value: u8,
@@ -120,7 +119,6 @@ pub(crate) enum Wrong {
     },
     /// What a job brought.
     Answer {
-        /// Which drive was asked.
         drive: u8,
         /// What it brought.
         value: u32,

@@ -22,7 +22,7 @@ impl campaign::Campaign for Campaign {
 
     fn names(&self) -> Vec<String> {
         let drives = self.shape.drives;
-        self.cases.iter().map(|own| own.name(drives)).collect()
+        self.cases.iter().map(|case| case.name(drives)).collect()
     }
 
     fn pinned(&self) -> Vec<(&'static str, u64)> {
@@ -97,8 +97,11 @@ impl campaign::PlayedCampaign for PlayedCampaign {
     }
 
     fn lines(&self, place: usize) -> String {
-        let own = self.outcomes.iter().filter(|own| own.class == class(place));
-        own.map(|outcome| line(outcome, self.drives)).collect()
+        let all = self
+            .outcomes
+            .iter()
+            .filter(|case| case.class == class(place));
+        all.map(|outcome| line(outcome, self.drives)).collect()
     }
 
     fn json(&self, place: Option<usize>) -> serde_json::Value {

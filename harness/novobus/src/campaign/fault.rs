@@ -13,13 +13,10 @@ use std::time::Duration;
 /// A bit of a byte on the line (ND21 8.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum LineBit {
-    /// The start bit.
     Start,
     /// Data bit 0 to 7.
     Data(u8),
-    /// The parity bit.
     Parity,
-    /// The stop bit.
     Stop,
 }
 

@@ -31,10 +31,10 @@ pub(crate) fn find(name: &Path) -> Option<Result<Campaign, CampaignError>> {
         )
     };
     let read = source.map_err(said);
-    Some(read.and_then(|own| Campaign::load(&own, &folder).map_err(CampaignError::Mistakes)))
+    Some(read.and_then(|source| Campaign::load(&source, &folder).map_err(CampaignError::Mistakes)))
 }
 
 /// The same, as a campaign of any bus.
 pub(crate) fn found(name: &Path) -> Option<Result<Box<dyn campaign::Campaign>, CampaignError>> {
-    Some(find(name)?.map(|own| -> Box<dyn campaign::Campaign> { Box::new(own) }))
+    Some(find(name)?.map(|campaign| -> Box<dyn campaign::Campaign> { Box::new(campaign) }))
 }

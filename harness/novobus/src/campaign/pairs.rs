@@ -76,7 +76,6 @@ pub(crate) enum PairsError {
         "{name} has {singles} single faults, and all pairs of at most {MOST_SINGLES} are counted; name fewer links or bytes in its file, or use --sample"
     )]
     TooMany {
-        /// Which campaign.
         name: String,
         /// How many single faults it has.
         singles: u64,
@@ -86,7 +85,7 @@ pub(crate) enum PairsError {
     Contradiction(#[from] Contradiction),
     /// Shared and played from the start, a case differs.
     #[error(
-        "{campaign}: the case {case} is {shared} where cases share what they have in common, and {own} from the start; please report it"
+        "{campaign}: the case {case} is {shared} where cases share what they have in common, and {alone} from the start; please report it"
     )]
     Differs {
         campaign: String,
@@ -94,7 +93,7 @@ pub(crate) enum PairsError {
         /// Its class where cases share.
         shared: CaseClass,
         /// Its class when it is played from the start.
-        own: CaseClass,
+        alone: CaseClass,
     },
 }
 
@@ -102,20 +101,20 @@ pub(crate) enum PairsError {
 fn in_threads<W>(
     threads: usize,
     items: usize,
-    own: impl Fn() -> W + Sync,
+    worker: impl Fn() -> W + Sync,
     work: impl Fn(&mut W, usize, &mut PairCounts) -> Result<(), PairsError> + Sync,
 ) -> Result<PairCounts, PairsError> {
     let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
     let all = Mutex::new(Ok(PairCounts::default()));
     let thread = || {
-        let (mut own, mut counts) = (own(), PairCounts::default());
+        let (mut worker, mut counts) = (worker(), PairCounts::default());
         let mut done = Ok(());
         while !failed.load(Ordering::Relaxed) && done.is_ok() {
             let item = next.fetch_add(1, Ordering::Relaxed);
             if item >= items {
                 break;
             }
-            done = work(&mut own, item, &mut counts);
+            done = work(&mut worker, item, &mut counts);
         }
         failed.fetch_or(done.is_err(), Ordering::Relaxed);
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
@@ -244,11 +243,11 @@ impl Campaign {
                 let Some(case) = pairs.get(item) else {
                     return Ok(());
                 };
-                let (own, _) = self.play(case)?;
+                let (alone, _) = self.play(case)?;
                 if player.shares() {
-                    self.compare(&player.play(case)?, &own)?;
+                    self.compare(&player.play(case)?, &alone)?;
                 }
-                counts.add(case, own.class, own.evidence.named, 1);
+                counts.add(case, alone.class, alone.evidence.named, 1);
                 progress(1);
                 Ok(())
             },
@@ -256,15 +255,15 @@ impl Campaign {
         Ok(self.played_pairs(&singles, Some(seed), &counts))
     }
 
-    fn compare(&self, shared: &CaseOutcome, own: &CaseOutcome) -> Result<(), PairsError> {
-        if shared == own {
+    fn compare(&self, shared: &CaseOutcome, alone: &CaseOutcome) -> Result<(), PairsError> {
+        if shared == alone {
             return Ok(());
         }
         Err(PairsError::Differs {
             campaign: self.name.clone(),
-            case: own.case.name(self.shape.drives),
+            case: alone.case.name(self.shape.drives),
             shared: shared.class,
-            own: own.class,
+            alone: alone.class,
         })
     }
 
@@ -280,7 +279,7 @@ impl Campaign {
             singles: singles.len() as u64,
             seed,
             part: None,
-            classes: CaseClass::ALL.map(|own| own.name().to_owned()).into(),
+            classes: CaseClass::ALL.map(|class| class.name().to_owned()).into(),
             counts: counts.counts.map(Vec::from),
             closer: counts.closer,
         }

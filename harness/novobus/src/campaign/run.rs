@@ -96,9 +96,9 @@ impl Campaign {
     pub(crate) fn load(source: &Source, folder: &Path) -> Result<Self, Box<Problems>> {
         let read = read(source).map_err(Box::new)?;
         let mistake = |problem: Problem| Box::new(read.problems(problem));
-        let own = folder.join(&read.file.scenario);
-        let path = if own.is_file() {
-            own
+        let beside = folder.join(&read.file.scenario);
+        let path = if beside.is_file() {
+            beside
         } else {
             PathBuf::from(&read.file.scenario)
         };
@@ -128,7 +128,7 @@ impl Campaign {
         }
         let entry = RingScenario::new(scenario, read.file.drives)?;
         let plan = &entry.plan;
-        let own = |problem| {
+        let in_scenario = |problem| {
             let source = &entry.source;
             Box::new(Problems::new(
                 &source.name,
@@ -139,7 +139,7 @@ impl Campaign {
         let deviates = |setup: &&Setup| matches!(setup.what, SetupKind::Deviates(_));
         if let Some(setup) = entry.scenario.header.setups.iter().find(deviates) {
             let message = "what a wrong drive does is no measure of the bus";
-            return Err(own(Problem::new(
+            return Err(in_scenario(Problem::new(
                 setup.span,
                 message,
                 "drives by the manual expected in a campaign",
@@ -147,7 +147,7 @@ impl Campaign {
         }
         if let Some(master) = &entry.scenario.header.master {
             let message = "what a wrong master does is no measure of the bus";
-            return Err(own(Problem::new(
+            return Err(in_scenario(Problem::new(
                 master.span,
                 message,
                 "a master by the manual expected in a campaign",
@@ -159,7 +159,7 @@ impl Campaign {
             link
         };
         let drives = plan.rings.first().map_or(0, |ring| ring.drives());
-        let (played, shape) = match talk(plan).map_err(own)? {
+        let (played, shape) = match talk(plan).map_err(in_scenario)? {
             MasterTalk::Bytes(bytes) => {
                 let Some(by_manual) = ByManual::new(start, bytes) else {
                     let message =
@@ -348,7 +348,7 @@ impl CasePlayer<'_> {
     /// # Errors
     /// It fits no class.
     pub(crate) fn play(&mut self, case: &CaseFaults) -> Result<CaseOutcome, Contradiction> {
-        match self.sharing.as_mut().and_then(|own| own.play(case)) {
+        match self.sharing.as_mut().and_then(|sharing| sharing.play(case)) {
             Some(evidence) => self.campaign.outcome(case, evidence.as_ref().clone()),
             None => self.campaign.play(case).map(|(outcome, _)| outcome),
         }

@@ -95,12 +95,12 @@ impl DrivesBeyondBus for Known<'_> {
         if let Some(known) = all.get(number).copied().flatten() {
             return Some(known);
         }
-        let own = compare(self.cells(drive)?);
+        let compared = compare(self.cells(drive)?);
         if all.len() <= number {
             all.resize(number + 1, None);
         }
-        all[number] = Some(own);
-        Some(own)
+        all[number] = Some(compared);
+        Some(compared)
     }
 }
 

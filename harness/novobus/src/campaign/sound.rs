@@ -87,7 +87,7 @@ impl Sound {
             let Some(sound) = self.end.cells(drive) else {
                 continue;
             };
-            let same = now.compared(drive, |own| differences(sound, own).next().is_none());
+            let same = now.compared(drive, |cells| differences(sound, cells).next().is_none());
             if same == Some(true) {
                 continue;
             }
@@ -116,8 +116,8 @@ impl Sound {
         (0..now.count()).all(|drive| {
             let addressed = |cells: &Cells| cells.peek(BUS_ADDR);
             let of_sound = self.end.bus_end(drive).zip(self.end.cells(drive));
-            let own = now.bus_end(drive).zip(now.cells(drive));
-            own.zip(of_sound)
+            let real = now.bus_end(drive).zip(now.cells(drive));
+            real.zip(of_sound)
                 .is_some_and(|((end, cells), (sound, held))| {
                     end.waits_as(sound) && addressed(cells) == addressed(held)
                 })

@@ -28,7 +28,7 @@ pub(super) fn is_midway(capture: &Capture) -> bool {
     // Each byte had left the ring.
     if capture
         .listened
-        .is_some_and(|own| own.before > flight(capture))
+        .is_some_and(|listened| listened.before > flight(capture))
     {
         return false;
     }
@@ -45,7 +45,7 @@ pub(super) fn is_midway(capture: &Capture) -> bool {
                 .map_or(0, |drive| ring.stations.saturating_sub(drive));
             // A clock that is 10 % wrong is no reason.
             let earliest = first.at + Span::from_units(octet.units() * u64::from(passed) * 9 / 10);
-            link.octets().first().is_some_and(|own| own.at < earliest)
+            link.octets().first().is_some_and(|byte| byte.at < earliest)
         })
     })
 }
@@ -56,7 +56,7 @@ const MOST_OF_A_TELEGRAM: u64 = 2 + MAX_NET_LENGTH as u64;
 /// Whether no more was sent before a time than the end of a telegram takes to leave its ring.
 pub(super) fn is_one_telegram(capture: &Capture, start: Instant) -> bool {
     let links = capture.traces.iter().flat_map(|ring| &ring.channels);
-    let ends = links.flat_map(|link| link.octets().iter().map(|own| own.at));
+    let ends = links.flat_map(|link| link.octets().iter().map(|byte| byte.at));
     let front: Vec<Instant> = ends.filter(|at| *at <= start).collect();
     let most = Span::from_units(capture.rate.byte_time().units() * MOST_OF_A_TELEGRAM * 3 / 2);
     match (front.iter().min(), front.iter().max()) {
@@ -78,20 +78,20 @@ pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
     let octet = capture.rate.byte_time();
     let silence = flight(capture);
     let links = capture.traces.iter().flat_map(|ring| &ring.channels);
-    let begins = |own: &LineByte| {
-        let sent = own.received.filter(|_| own.error.is_none());
+    let begins = |byte: &LineByte| {
+        let sent = byte.received.filter(|_| byte.error.is_none());
         sent.is_some_and(|byte| SyncByte::decode(byte).is_ok())
     };
     let mut ends: Vec<(Instant, bool)> = links
         .flat_map(|link| {
             let ends = link.octets().iter();
-            ends.map(move |own| (own.at, link.from.is_none() && begins(own)))
+            ends.map(move |byte| (byte.at, link.from.is_none() && begins(byte)))
         })
         .collect();
     ends.sort_unstable();
-    let last = |own: &Trace| {
-        let last = own.channels.iter().find(|link| link.to.is_none());
-        last.and_then(|link| link.octets().last()).map(|own| own.at)
+    let last = |ring: &Trace| {
+        let last = ring.channels.iter().find(|link| link.to.is_none());
+        last.and_then(|link| Some(link.octets().last()?.at))
     };
     let heard = capture.traces.iter().filter_map(last).min();
     let begins = ends.windows(2).filter_map(|two| match *two {
@@ -106,7 +106,7 @@ pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
 pub(super) fn gaps(capture: &Capture) -> Vec<Gap> {
     let octet = capture.rate.byte_time();
     let mut gaps = gap::gaps(ends(capture).into_iter().map(|at| (at - octet, at)));
-    gaps.retain(|own| own.silence >= MASTER_PAUSE);
+    gaps.retain(|gap| gap.silence >= MASTER_PAUSE);
     gaps
 }
 
@@ -116,7 +116,7 @@ const MASTER_PAUSE: Span = Span::from_millis(1_000);
 /// When the bytes of all links had passed, in order.
 fn ends(capture: &Capture) -> Vec<Instant> {
     let links = capture.traces.iter().flat_map(|ring| &ring.channels);
-    let ends = links.flat_map(|link| link.octets().iter().map(|own| own.at));
+    let ends = links.flat_map(|link| link.octets().iter().map(|byte| byte.at));
     let mut ends: Vec<_> = ends.collect();
     ends.sort_unstable();
     ends
@@ -128,17 +128,17 @@ pub(super) fn without(capture: &Capture, gaps: &[Gap]) -> Capture {
     let mut short = capture.clone();
     // Each byte has left the ring before the next one is sent.
     let pause = flight(capture);
-    let gaps = gaps.iter().filter(|own| own.silence > pause);
+    let gaps = gaps.iter().filter(|gap| gap.silence > pause);
     let gaps: Vec<_> = gaps
-        .map(|own| (ends[own.piece], own.silence.saturating_sub(pause)))
+        .map(|gap| (ends[gap.piece], gap.silence.saturating_sub(pause)))
         .collect();
     let earlier = |at: Instant| {
-        let before = gaps.iter().filter(|own| own.0 <= at);
-        before.fold(at, |at, own| at - own.1)
+        let before = gaps.iter().filter(|gap| gap.0 <= at);
+        before.fold(at, |at, gap| at - gap.1)
     };
     for link in short.traces.iter_mut().flat_map(|ring| &mut ring.channels) {
-        for own in link.octets_mut().into_iter().flatten() {
-            own.at = earlier(own.at);
+        for byte in link.octets_mut().into_iter().flatten() {
+            byte.at = earlier(byte.at);
         }
     }
     if let Some(listened) = &mut short.listened {
@@ -152,14 +152,14 @@ pub(super) fn parts(capture: &Capture, gaps: &[Gap]) -> Vec<Capture> {
     let ends = ends(capture);
     let octet = capture.rate.byte_time();
     let mut begins = vec![Instant::START];
-    begins.extend(gaps.iter().map(|own| ends[own.piece] - octet));
+    begins.extend(gaps.iter().map(|gap| ends[gap.piece] - octet));
     let part = |place: usize| {
         let mut part = from(capture, begins[place]);
         part.listened = None;
         let end = begins.get(place + 1).copied().unwrap_or(Instant::NEVER);
         for link in part.traces.iter_mut().flat_map(|ring| &mut ring.channels) {
             if let Some(octets) = link.octets_mut() {
-                octets.retain(|own| own.at <= end);
+                octets.retain(|byte| byte.at <= end);
             }
         }
         part
@@ -185,7 +185,7 @@ pub(super) fn from(capture: &Capture, start: Instant) -> Capture {
 fn later(octets: &[LineByte], start: Instant) -> &[LineByte] {
     octets
         .iter()
-        .position(|own| own.at > start)
+        .position(|byte| byte.at > start)
         .map_or(&[], |first| &octets[first..])
 }
 
@@ -207,7 +207,7 @@ pub(super) enum Shown {
 /// When each ring has shown that its drives are in normal mode.
 pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
     let rings = capture.traces.iter().filter_map(|ring| {
-        let find = |own: fn(&Channel) -> bool| ring.channels.iter().find(|link| own(link));
+        let find = |is_end: fn(&Channel) -> bool| ring.channels.iter().find(|link| is_end(link));
         let first = find(|link| link.from.is_none())?;
         let last = find(|link| link.to.is_none())?;
         (!first.octets().is_empty())
@@ -217,7 +217,7 @@ pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
         at: Instant::START,
         lost: false,
     };
-    rings.fold(nothing, |all, own| match (all, own) {
+    rings.fold(nothing, |all, next| match (all, next) {
         (Shown::Wrong, _) | (_, Shown::Wrong) => Shown::Wrong,
         (Shown::From { at: a, lost: b }, Shown::From { at, lost }) => Shown::From {
             at: a.max(at),
@@ -246,9 +246,9 @@ impl Beginning {
         (first, last): (&Channel, &Channel),
     ) -> Self {
         let good = |link: &Channel| {
-            let octets = link.octets().iter().filter(|own| own.error.is_none());
+            let octets = link.octets().iter().filter(|byte| byte.error.is_none());
             octets
-                .filter_map(|own| Some((own.at, own.received?)))
+                .filter_map(|byte| Some((byte.at, byte.received?)))
                 .collect()
         };
         let sent: Vec<(Instant, u8)> = good(first);
@@ -288,8 +288,8 @@ impl Beginning {
             return 0;
         };
         let front = &self.roles[..first];
-        let drive = front.iter().rev().find_map(|own| own.drive());
-        let whole = |own: &Role| matches!(own, Role::Check { .. }) && own.drive() == drive;
+        let drive = front.iter().rev().find_map(|role| role.drive());
+        let whole = |role: &Role| matches!(role, Role::Check { .. }) && role.drive() == drive;
         if front.iter().any(whole) { 0 } else { first }
     }
 
@@ -321,35 +321,37 @@ impl Beginning {
         let passed = |(at, byte): &&(Instant, u8)| {
             self.sent[..idle]
                 .iter()
-                .any(|(sent, own)| own == byte && self.answers((*sent, *at)))
+                .any(|(sent, first)| first == byte && self.answers((*sent, *at)))
         };
         let synco = self
             .came
             .iter()
             .find(passed)
             .filter(|_| is_whole && self.behind_a_rest() == 0);
-        let all = [address, sequence.map(|own| own.0), synco.map(|own| own.0)];
+        let at = |byte: &(Instant, u8)| byte.0;
+        let all = [address, sequence.map(at), synco.map(at)];
         match all.into_iter().flatten().min() {
             Some(at) => Shown::From {
                 at,
                 lost: self.is_lost(at),
             },
-            None if is_whole && !self.came.iter().all(|own| self.may_come(*own)) => Shown::Wrong,
+            None if is_whole && !self.came.iter().all(|byte| self.may_come(*byte)) => Shown::Wrong,
             None => Shown::Never,
         }
     }
 
     /// Whether bytes do not come back that were sent long before this time.
     fn is_lost(&self, at: Instant) -> bool {
-        let due = |own: &&(Instant, u8)| own.0 + self.way.1 + self.tolerance < at && own.1 != PAUSE;
-        let came = self.came.iter().take_while(|own| own.0 < at).count();
+        let home = |sent: Instant| sent + self.way.1 + self.tolerance;
+        let due = |(sent, byte): &&(Instant, u8)| home(*sent) < at && *byte != PAUSE;
+        let came = self.came.iter().take_while(|byte| byte.0 < at).count();
         self.sent.iter().filter(due).count() > came
     }
 
     /// Whether right drives in any mode can send a byte: zeros and numbers of the error mode, and bytes of the master's that drives count on
     /// (ND21 9.7).
     fn may_come(&self, (at, byte): (Instant, u8)) -> bool {
-        let counted = |own: u8| byte.wrapping_sub(own) <= self.drives;
+        let counted = |counted_on: u8| byte.wrapping_sub(counted_on) <= self.drives;
         let before = self
             .sent
             .first()
@@ -359,6 +361,6 @@ impl Beginning {
             || self
                 .sent
                 .iter()
-                .any(|(sent, own)| self.answers((*sent, at)) && counted(*own))
+                .any(|(sent, first)| self.answers((*sent, at)) && counted(*first))
     }
 }

@@ -27,7 +27,7 @@ pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<FaultStep> 
             .iter()
             .take_while(|next| next.received.is_none() && next.sent.is_some())
             .count();
-        let own = |fault: LinkFault| at_byte(number, fault);
+        let here = |fault: LinkFault| at_byte(number, fault);
         match (byte.sent, byte.received) {
             (None, Some(_)) if byte.error == Some(LineError::Break) => {
                 let start = byte.at - rate.byte_time();
@@ -36,7 +36,7 @@ pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<FaultStep> 
                 faults.push(FaultStep {
                     byte: None,
                     at: Some(at),
-                    ..own(LinkFault::Break(span))
+                    ..here(LinkFault::Break(span))
                 });
                 number += lost as u64;
                 place += lost;
@@ -44,31 +44,31 @@ pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<FaultStep> 
             (None, Some(received)) => {
                 let before = place.checked_sub(1).and_then(|place| bytes.get(place));
                 faults.push(if doubled(before, byte, rate) {
-                    own(LinkFault::Duplicate)
+                    here(LinkFault::Duplicate)
                 } else {
                     at_byte(number + 1, LinkFault::Insert(received))
                 });
             }
             (Some(_), Some(_)) if byte.error == Some(LineError::Break) => {
                 let span = break_span(byte, bytes.get(place + lost), rate);
-                faults.push(own(LinkFault::Break(span)));
+                faults.push(here(LinkFault::Break(span)));
                 number += lost as u64;
                 place += lost;
             }
             (Some(_), None) => {
                 if lost + 1 >= CUT {
-                    faults.push(own(LinkFault::Cut));
+                    faults.push(here(LinkFault::Cut));
                     number += lost as u64;
                     place += lost;
                     if place + 1 < bytes.len() {
                         faults.push(at_byte(number + 1, LinkFault::Join));
                     }
                 } else {
-                    faults.push(own(LinkFault::Drop));
+                    faults.push(here(LinkFault::Drop));
                 }
             }
             (Some(sent), Some(received)) => {
-                faults.extend(damage(sent, received, byte.error).map(own));
+                faults.extend(damage(sent, received, byte.error).map(here));
             }
             (None, None) => {}
         }

@@ -117,7 +117,7 @@ pub(crate) fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Jud
     let judged = judge_part(capture, options);
     let differs = judged
         .as_ref()
-        .map_or(true, |own| own.verdict == Verdict::Failed);
+        .map_or(true, |judged| judged.verdict == Verdict::Failed);
     let gaps = if differs { gaps(capture) } else { Vec::new() };
     if gaps.is_empty() {
         return judged;
@@ -127,7 +127,7 @@ pub(crate) fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Jud
     if judged.verdict == Verdict::Failed {
         let parts = parts(capture, &gaps).into_iter();
         let mut parts = parts.filter_map(|part| judge_part(&part, options).ok());
-        judged = match parts.find(|own| own.verdict == Verdict::Failed) {
+        judged = match parts.find(|judged| judged.verdict == Verdict::Failed) {
             Some(failed) => failed,
             None => judged.in_doubt(OF_A_GAP),
         };
@@ -273,9 +273,9 @@ fn judge_as(
 ) -> Result<Judged, JudgeError> {
     let (model, remarks) = model(capture, options, more)?;
     let model = as_captured(&model, capture);
-    let behind = |ring: usize, own: &Channel, index: usize| {
+    let behind = |ring: usize, link: &Channel, index: usize| {
         // Data behind the drive that cannot be predicted stand at the same place on the last link.
-        let told = told.get(ring).filter(|_| own.from.is_some());
+        let told = told.get(ring).filter(|_| link.from.is_some());
         told.is_some_and(|told| told.unforeseen.contains(&index))
     };
     let tolerance = Span::from_units(options.tolerance().units().max(6));
@@ -290,9 +290,10 @@ fn judge_as(
         },
     );
     let heard = capture.end();
-    let end = capture.listened.map_or(heard, |own| own.until.max(heard));
+    let listened = capture.listened;
+    let end = listened.map_or(heard, |listened| listened.until.max(heard));
     let inner =
-        |ring: usize, own: &Channel, index: usize| own.to.is_some() || behind(ring, own, index);
+        |ring: usize, link: &Channel, index: usize| link.to.is_some() || behind(ring, link, index);
     let master = compare(left, right, tolerance, &inner, Some(end));
     let links = compare(left, right, tolerance, &behind, Some(end));
     let last =
@@ -305,9 +306,9 @@ fn judge_as(
     } else {
         Verdict::Passed
     };
-    let of_drives = |ring: usize, own: &Channel, index: usize| {
-        let of_drive = told.get(ring).is_some_and(|told| told.own.contains(&index));
-        inner(ring, own, index) || of_drive
+    let of_drives = |ring: usize, link: &Channel, index: usize| {
+        let told = told.get(ring);
+        inner(ring, link, index) || told.is_some_and(|told| told.of_drives.contains(&index))
     };
     // Adapters give bytes late: how late, the bytes tell that are the same.
     let late = Span::from_units(links.latest.units().saturating_mul(2));
@@ -346,9 +347,8 @@ fn before(end: Instant, late: Span) -> Instant {
 /// The links without which there is no verdict.
 fn not_captured(capture: &Capture) -> String {
     let rings = capture.traces.iter().enumerate();
-    let last = rings.map(|(ring, own)| link_name(ring, own.stations, usize::from(own.stations)));
-    let last: Vec<_> = last.collect();
-    let last = last.join(", ");
+    let last = rings.map(|(ring, trace)| link_name(ring, trace.stations, trace.stations.into()));
+    let last = last.collect::<Vec<_>>().join(", ");
     format!("the master's incoming link ({last}) was not captured")
 }
 
@@ -388,14 +388,14 @@ fn model(
 /// The model's links, as far as they were captured. What a damaged byte was is not known, and no drive uses it (ND21 9.7).
 fn as_captured(model: &Capture, capture: &Capture) -> Capture {
     let mut model = model.clone();
-    for (trace, own) in model.traces.iter_mut().zip(&capture.traces) {
+    for (trace, recorded) in model.traces.iter_mut().zip(&capture.traces) {
         let ends = |link: &Channel| (link.from, link.to);
-        let captured = |link: &Channel| own.channels.iter().find(|o| ends(o) == ends(link));
+        let captured = |link: &Channel| recorded.channels.iter().find(|o| ends(o) == ends(link));
         trace.channels.retain(|link| captured(link).is_some());
         for link in &mut trace.channels {
             let heard = captured(link).map_or(&[][..], Channel::octets);
             let pairs = link.octets_mut().into_iter().flatten().zip(heard);
-            for (byte, heard) in pairs.filter(|(own, heard)| own.error == heard.error) {
+            for (byte, heard) in pairs.filter(|(byte, heard)| byte.error == heard.error) {
                 if byte.error.is_some() {
                     (byte.sent, byte.received) = (heard.sent, heard.received);
                 }
@@ -414,7 +414,8 @@ fn located(capture: &Capture) -> Option<(usize, u8)> {
         // The zeros of a check sequence make the ring spell out other drives (the figure of ND21 9.8).
         let first = trace.channels.iter().find(|link| link.from.is_none());
         let sent = first.map_or(&[][..], Channel::octets);
-        let zeros = sent.iter().rev().take(8).filter(|own| own.sent == Some(0));
+        let last = sent.iter().rev().take(8);
+        let zeros = last.filter(|byte| byte.sent == Some(0));
         (found.sure || zeros.count() < 8).then_some((ring, found.drive))
     })
 }

@@ -146,7 +146,7 @@ fn a_gap_accuses_no_right_drive() {
     let gap = |capture: &Capture, number: usize, is_lost: bool| {
         let links = capture.traces[0].channels.iter();
         let mut ends: Vec<_> = links
-            .flat_map(|own| own.octets().iter().map(|own| own.at))
+            .flat_map(|link| link.octets().iter().map(|byte| byte.at))
             .collect();
         ends.sort_unstable();
         let silent = ends
@@ -155,14 +155,14 @@ fn a_gap_accuses_no_right_drive() {
         let begins: Vec<_> = silent.map(|two| two[1]).collect();
         let (begin, end) = (begins[number], begins[number + usize::from(is_lost)]);
         let mut all = capture.clone();
-        for own in all.traces[0]
+        for bytes in all.traces[0]
             .channels
             .iter_mut()
-            .filter_map(|own| own.octets_mut())
+            .filter_map(|link| link.octets_mut())
         {
-            own.retain(|own| own.at < begin || own.at >= end);
-            let later = own.iter_mut().filter(|own| own.at >= end);
-            later.for_each(|own| own.at += Span::from_millis(3_600_000));
+            bytes.retain(|byte| byte.at < begin || byte.at >= end);
+            let later = bytes.iter_mut().filter(|byte| byte.at >= end);
+            later.for_each(|byte| byte.at += Span::from_millis(3_600_000));
         }
         all
     };
@@ -183,7 +183,7 @@ fn a_gap_accuses_no_right_drive() {
             (2, true),
         ] {
             let judged = judge(&gap(&capture, number, is_lost), &options(None)).expect("judged");
-            let note = |own: &String| own.starts_with("the log has a gap of 3600");
+            let note = |remark: &String| remark.starts_with("the log has a gap of 3600");
             assert!(judged.remarks.iter().any(note), "{:?}", judged.remarks);
             found.push(judged.verdict);
         }

@@ -63,7 +63,7 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
     let reset: BTreeSet<(usize, u8)> = told
         .iter()
         .enumerate()
-        .flat_map(|(ring, own)| own.resets.iter().map(move |(_, drive)| (ring, *drive)))
+        .flat_map(|(ring, told)| told.resets.iter().map(move |(_, drive)| (ring, *drive)))
         .collect();
     let until_then = reset
         .iter()

@@ -19,17 +19,17 @@ fn given(capture: &Capture, moments: [u64; 2], until: u64) -> Capture {
     let links = capture.traces[0].channels.iter();
     let links = links.filter(|link| link.from.is_none() || link.to.is_none());
     let channels = links.zip(moments).map(|(link, moment)| {
-        let read = |own: &LineByte| {
-            let at = own.at.since_start().as_nanos() + PORTION - moment;
+        let read = |byte: &LineByte| {
+            let at = byte.at.since_start().as_nanos() + PORTION - moment;
             at.div_ceil(PORTION) * PORTION + moment
         };
-        let bytes = link.octets().iter().filter(|own| read(own) <= until);
+        let bytes = link.octets().iter().filter(|byte| read(byte) <= until);
         let bytes: Vec<_> = bytes.collect();
-        let dated = bytes.iter().enumerate().map(|(index, own)| {
+        let dated = bytes.iter().enumerate().map(|(index, byte)| {
             let rest = bytes[index + 1..].iter();
-            let behind = rest.take_while(|next| read(next) == read(own)).count() as u64;
-            let at = Instant::START + Span::from_nanos(read(own) - behind * octet);
-            LineByte { at, ..**own }
+            let behind = rest.take_while(|next| read(next) == read(byte)).count() as u64;
+            let at = Instant::START + Span::from_nanos(read(byte) - behind * octet);
+            LineByte { at, ..**byte }
         });
         Channel::of_octets(link.from, link.to, dated.collect())
     });
@@ -64,7 +64,7 @@ fn bytes_under_way_accuse_no_drive() {
                 "{moments:?} {until}: {shown}"
             );
             let why = judged.remarks.iter();
-            inconclusive += why.filter(|own| own.contains("under way")).count();
+            inconclusive += why.filter(|remark| remark.contains("under way")).count();
         }
     }
     assert!(inconclusive > 5, "{inconclusive}");

@@ -210,7 +210,7 @@ fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<S
             let start = byte.at - byte_time;
             let behind = start.since(free).units() <= gap;
             match runs.last_mut() {
-                Some((_, own, run)) if behind && *own == index => run.push(sent),
+                Some((_, link, run)) if behind && *link == index => run.push(sent),
                 _ => runs.push((if behind { free } else { start }, index, vec![sent])),
             }
             free = if behind { free + byte_time } else { byte.at };

@@ -28,7 +28,7 @@ pub(crate) struct Told {
     /// Bytes received that plain memory may answer with other bytes than a right drive: process data, of which its settings choose the cell
     /// (ND21 9.4), and data of cells that were written and that a drive may write itself or may have lost in a silence, without its supply
     /// (14.2), or that a reset may have changed (10.5), with their checking bytes.
-    pub(crate) own: BTreeSet<usize>,
+    pub(crate) of_drives: BTreeSet<usize>,
     /// When the bytes of each ResetH8 were sent, and to which drive (10.5).
     pub(crate) resets: Vec<(Instant, u8)>,
 }
@@ -53,11 +53,11 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .filter(|(role, (_, (byte, _)))| !(*role == Role::Idle && *byte == PAUSE))
         .map(|(role, (at, _))| Asked { role, at: *at })
         .collect();
-    let reset = |own: &Asked| match own.role {
+    let reset = |byte: &Asked| match byte.role {
         Role::Command {
             section: RESET,
             drive,
-        } => Some((own.at, drive?)),
+        } => Some((byte.at, drive?)),
         _ => None,
     };
     let mut told = Told {
@@ -65,9 +65,9 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         ..Told::default()
     };
     for link in trace.channels.iter().filter(|link| link.from.is_some()) {
-        let own = of_link(link, &asked, size.drives());
+        let told_by_link = of_link(link, &asked, size.drives());
         let last = link.to.is_none();
-        for (cell, value) in own.cells {
+        for (cell, value) in told_by_link.cells {
             // A drive's own link tells of it what no later link can have damaged.
             if link.from == Some(cell.0) {
                 told.cells.insert(cell, value);
@@ -76,7 +76,7 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
             }
         }
         if last {
-            (told.unforeseen, told.own) = (own.unforeseen, own.own);
+            (told.unforeseen, told.of_drives) = (told_by_link.unforeseen, told_by_link.of_drives);
         }
     }
     told
@@ -108,21 +108,23 @@ fn behind_silences(asked: &[Asked], came: usize, stations: u8) -> Vec<(Instant, 
 
 /// Where the bytes behind each whole check sequence begin, with the time at which it had been sent.
 fn behind_sequences(asked: &[Asked]) -> Vec<(Instant, usize)> {
-    let in_sequence = |own: Option<&Asked>| own.is_some_and(|own| own.role == Role::CheckSequence);
-    let ends = asked.iter().enumerate().filter(|(index, own)| {
-        in_sequence(Some(own)) && !in_sequence(asked.get(index.saturating_add(1)))
+    let in_sequence =
+        |byte: Option<&Asked>| byte.is_some_and(|byte| byte.role == Role::CheckSequence);
+    let ends = asked.iter().enumerate().filter(|(index, byte)| {
+        in_sequence(Some(byte)) && !in_sequence(asked.get(index.saturating_add(1)))
     });
-    ends.map(|(index, own)| (own.at, index + 1)).collect()
+    ends.map(|(index, byte)| (byte.at, index + 1)).collect()
 }
 
 /// What was asked behind a check sequence that has come back whole at `at`: `beside`, where no byte was lost and none came unasked.
 fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
-    if sequences.binary_search_by_key(&beside, |own| own.1).is_ok() {
+    let known = sequences.binary_search_by_key(&beside, |(_, at)| *at);
+    if known.is_ok() {
         return beside;
     }
     let sent = sequences.partition_point(|(sent, _)| *sent <= at);
     let last = sequences.get(sent.wrapping_sub(1));
-    last.map_or(beside, |own| own.1)
+    last.map_or(beside, |(_, at)| *at)
 }
 
 /// Reads a link beside what was asked. What comes back stands beside what was asked until bytes are lost or drives send zeros unasked (9.9);
@@ -132,7 +134,7 @@ fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
     let silences = behind_silences(asked, link.octets().len(), stations);
     let mut reader = Reader {
         told: Told::default(),
-        own: link.from.filter(|_| link.to.is_some()),
+        sender: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
         written: BTreeSet::new(),
         lost: BTreeSet::new(),
@@ -160,8 +162,8 @@ fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
         }
         let silent = silences.partition_point(|(sent, _)| *sent < at);
         let silent = silences.get(silent.wrapping_sub(1));
-        beside = silent.map_or(beside, |own| beside.max(own.1));
-        let role = asked.get(beside).map_or(Role::Foreign, |own| own.role);
+        beside = silent.map_or(beside, |silence| beside.max(silence.1));
+        let role = asked.get(beside).map_or(Role::Foreign, |byte| byte.role);
         beside += 1;
         if watch.see(byte.byte, byte.error.is_none()) == SequenceProgress::Complete {
             beside = behind(&sequences, beside, at);
@@ -177,7 +179,7 @@ fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
             // Where no address was seen yet, the capture does not show which drive is meant.
             let may_be_of_a_drive = role.drive().is_some() || !addressed;
             if matches!(role, Role::ProcessData { .. }) && may_be_of_a_drive {
-                reader.told.own.insert(index);
+                reader.told.of_drives.insert(index);
             }
         }
     }
@@ -187,7 +189,7 @@ fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
 struct Reader {
     told: Told,
     /// The drive that sends on this link, where what was sent is read, and not what arrived.
-    own: Option<u8>,
+    sender: Option<u8>,
     /// What a cell holds now; `None` if it was written with an unknown result.
     now: BTreeMap<(u8, u16), Option<u8>>,
     /// Cells that the master has written.
@@ -218,7 +220,7 @@ impl Reader {
                 open.push((index, address, byte));
                 // ReadLong has no checking byte (10.1). What a drive itself sent is not damaged yet, but a zero may be one of
                 // the error mode.
-                if open.len() == 4 || self.own == Some(drive) && byte != 0 {
+                if open.len() == 4 || self.sender == Some(drive) && byte != 0 {
                     self.settle(drive, None);
                 }
             }
@@ -239,8 +241,8 @@ impl Reader {
                 self.open.remove(&drive);
                 if self.last.remove(&drive) == Some(RESET) {
                     self.reset.insert(drive);
-                    self.now.retain(|(own, _), _| *own != drive);
-                    self.written.retain(|(own, _)| *own != drive);
+                    self.now.retain(|(other, _), _| *other != drive);
+                    self.written.retain(|(other, _)| *other != drive);
                 }
                 if let Some((address, width)) = writes {
                     for offset in 0..u16::from(width) {
@@ -267,15 +269,15 @@ impl Reader {
 
     /// Takes over the data of an answer that is whole.
     fn settle(&mut self, drive: u8, check: Option<usize>) {
-        let (mut changed, mut own) = (false, false);
+        let (mut changed, mut left_any) = (false, false);
         for (index, address, value) in self.open.remove(&drive).unwrap_or_default() {
             let left = match self.written.contains(&(drive, address)) {
                 true => is_of_the_drive(address) || self.lost.contains(&(drive, address)),
                 false => self.reset.contains(&drive),
             };
             if left {
-                own = true;
-                self.told.own.insert(index);
+                left_any = true;
+                self.told.of_drives.insert(index);
             }
             match self.now.get(&(drive, address)) {
                 None => {
@@ -297,8 +299,8 @@ impl Reader {
         if changed {
             self.told.unforeseen.extend(check);
         }
-        if own {
-            self.told.own.extend(check);
+        if left_any {
+            self.told.of_drives.extend(check);
         }
     }
 }

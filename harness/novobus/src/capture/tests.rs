@@ -61,15 +61,15 @@ fn shown(capture: &Capture) -> String {
     for (ring, trace) in capture.traces.iter().enumerate() {
         for channel in &trace.channels {
             let _infallible = write!(text, "{}:", name(ring, channel));
-            for own in channel.octets() {
-                let mark = match own.error {
+            for byte in channel.octets() {
+                let mark = match byte.error {
                     None => "",
                     Some(LineError::Parity) => "p",
                     Some(LineError::Framing) => "f",
                     Some(LineError::Break) => "b",
                     Some(LineError::Overrun) => "o",
                 };
-                let byte = own.received.unwrap_or_default();
+                let byte = byte.received.unwrap_or_default();
                 let _infallible = write!(text, " {byte:02X}{mark}");
             }
             text.push('\n');
@@ -128,16 +128,16 @@ fn our_own_files_survive() {
     let found = read(&file, Some(Rate::Baud38400)).expect("a capture");
     for (found, expected) in found.traces.iter().zip(&expected.traces) {
         for (found, expected) in found.channels.iter().zip(&expected.channels) {
-            let cut = |own: &LineByte| {
+            let cut = |byte: &LineByte| {
                 (
-                    own.at.since_start().as_nanos(),
-                    own.sent,
-                    own.received,
-                    own.error,
+                    byte.at.since_start().as_nanos(),
+                    byte.sent,
+                    byte.received,
+                    byte.error,
                 )
             };
             let both =
-                [found, expected].map(|own| own.octets().iter().map(cut).collect::<Vec<_>>());
+                [found, expected].map(|link| link.octets().iter().map(cut).collect::<Vec<_>>());
             assert_eq!(both[0], both[1]);
         }
     }

@@ -56,7 +56,7 @@ fn damaged(capture: &Capture) -> Vec<String> {
     let mut all = Vec::new();
     for (ring, trace) in capture.traces.iter().enumerate() {
         for link in &trace.channels {
-            let bad = |own: &&LineByte| own.error.is_some() || own.received.is_none();
+            let bad = |byte: &&LineByte| byte.error.is_some() || byte.received.is_none();
             let count = link.octets().iter().filter(bad).count();
             if count > 0 {
                 all.push(format!(
