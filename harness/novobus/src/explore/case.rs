@@ -122,7 +122,6 @@ pub(crate) enum To {
     Drive(u8),
     /// The drive of the telegram before.
     Same,
-    /// The next drive.
     Next,
     /// No drive: this address byte addresses no drive of the ring.
     Nobody(u8),
@@ -144,14 +143,7 @@ pub(crate) struct Damage {
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Harm {
     /// Bits are inverted.
-    Flip {
-        /// Data bits.
-        data: u8,
-        /// The parity bit.
-        parity: bool,
-        /// The stop bit.
-        stop: bool,
-    },
+    Flip { data: u8, parity: bool, stop: bool },
     /// Another byte arrives.
     Replace(u8),
     /// Nothing arrives.

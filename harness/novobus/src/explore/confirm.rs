@@ -104,7 +104,7 @@ fn blame(
         if tried.not_played.is_some()
             || tried
                 .difference
-                .is_some_and(|own| own.byte <= finding.difference.byte)
+                .is_some_and(|difference| difference.byte <= finding.difference.byte)
         {
             return Ok(());
         }
@@ -117,7 +117,7 @@ fn blame(
     finding.attempts.extend(target.recorded());
     let again = tried
         .difference
-        .is_some_and(|own| own.byte == finding.difference.byte);
+        .is_some_and(|difference| difference.byte == finding.difference.byte);
     if !again {
         return Ok(());
     }

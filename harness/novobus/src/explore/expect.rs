@@ -207,7 +207,6 @@ impl Drive {
 /// What a byte received must be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Must {
-    /// The value.
     pub(crate) byte: u8,
     /// Bits that are the drive's choice.
     pub(crate) open: u8,

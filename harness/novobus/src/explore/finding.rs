@@ -66,11 +66,11 @@ pub(crate) fn scenario_on(
 /// The tables of the manual that it is about, as the catalogue names them.
 pub(crate) fn sources(finding: &Finding) -> Vec<String> {
     let tables = MANUAL.tables().unwrap_or_default();
-    let own = tables
+    let table = tables
         .iter()
         .find(|table| table.section == finding.difference.section);
-    let own = own.or(tables.iter().find(|table| table.section == "9.1"));
-    own.map(|table| table.id.clone()).into_iter().collect()
+    let table = table.or(tables.iter().find(|table| table.section == "9.1"));
+    table.map(|table| table.id.clone()).into_iter().collect()
 }
 
 /// Bytes that drives may answer in more than one way: what they hold and measure, and the checking bytes over it.

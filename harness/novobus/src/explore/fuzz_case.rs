@@ -70,8 +70,8 @@ impl FuzzCase for Case {
         dice: &mut Dice,
     ) -> Self {
         let ring = usize::from(scope.second.is_some() && dice.percent(50));
-        let own = scope.ring(ring);
-        let maker = Generator::new(scope, own, swarm, dice);
+        let ring_scope = scope.ring(ring);
+        let maker = Generator::new(scope, ring_scope, swarm, dice);
         // Every third case is left to chance.
         let of_tour = (number % 3 < 2).then_some(number / 3 * 2 + number % 3);
         let of_tour = of_tour.and_then(|number| tour.get(usize::try_from(number).ok()?));
@@ -89,11 +89,11 @@ impl FuzzCase for Case {
     }
 
     fn is_of(&self, about: &FuzzSettings) -> bool {
-        let own = match self.ring() {
+        let drives = match self.ring() {
             0 => Some(about.drives),
             _ => about.second,
         };
-        own == Some(self.drives)
+        drives == Some(self.drives)
     }
 
     fn lane(&self) -> usize {
@@ -113,11 +113,11 @@ impl FuzzCase for Case {
         if about.ports {
             return Ok(match judged_again(finding, about, known)? {
                 None => JudgedAgain::Unknown,
-                Some(own) if own == *finding => JudgedAgain::Same,
-                Some(own) => JudgedAgain::Differs(format!(
+                Some(again) if again == *finding => JudgedAgain::Same,
+                Some(again) => JudgedAgain::Differs(format!(
                     "the file has \"{}\", its attempts give \"{}\"",
                     told(finding),
-                    told(&own)
+                    told(&again)
                 )),
             });
         }

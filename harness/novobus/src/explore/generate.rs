@@ -132,7 +132,6 @@ impl<'s> Generator<'s> {
         }
     }
 
-    /// A new case.
     pub(crate) fn case(&self, dice: &mut Dice) -> Case {
         let mut acts = Vec::new();
         for _ in 0..1 + dice.below(NEW_ACTS) {
@@ -191,9 +190,9 @@ impl<'s> Generator<'s> {
             Spice::Or,
             Spice::WriteIo,
         ];
-        let own = self.swarm.of(&CHANGES);
+        let changes = self.swarm.of(&CHANGES);
         for _ in 0..8 {
-            if let Some(spice) = dice.pick(&own) {
+            if let Some(spice) = dice.pick(&changes) {
                 let command = self.of_kind(*spice, dice);
                 if self.allows(command) {
                     return command;
@@ -312,9 +311,9 @@ impl<'s> Generator<'s> {
     }
 
     fn command(&self, dice: &mut Dice) -> RawCommand {
-        let own = self.swarm.of(&Spice::COMMANDS);
+        let commands = self.swarm.of(&Spice::COMMANDS);
         for _ in 0..8 {
-            let command = match dice.pick(&own) {
+            let command = match dice.pick(&commands) {
                 Some(spice) => self.of_kind(*spice, dice),
                 None => break,
             };
@@ -370,12 +369,12 @@ impl<'s> Generator<'s> {
 
     /// Puts faults on bytes, in a third of the cases.
     pub(crate) fn damage(&self, acts: &mut [Act], dice: &mut Dice) {
-        let own = self.swarm.of(&Spice::FAULTS);
-        if own.is_empty() || !dice.percent(35) {
+        let faults = self.swarm.of(&Spice::FAULTS);
+        if faults.is_empty() || !dice.percent(35) {
             return;
         }
         for _ in 0..1 + dice.below(2) {
-            let Some(damage) = self.one_damage(&own, dice) else {
+            let Some(damage) = self.one_damage(&faults, dice) else {
                 return;
             };
             let at = dice.below(acts.len());
@@ -394,10 +393,10 @@ impl<'s> Generator<'s> {
         }
     }
 
-    fn one_damage(&self, own: &[Spice], dice: &mut Dice) -> Option<Damage> {
+    fn one_damage(&self, faults: &[Spice], dice: &mut Dice) -> Option<Damage> {
         let link = *dice.pick(&self.ring.links)?;
         let flip = |data, parity, stop| Harm::Flip { data, parity, stop };
-        let harm = match (dice.pick(own)?, dice.below(4)) {
+        let harm = match (dice.pick(faults)?, dice.below(4)) {
             (Spice::Flip, 0) => flip(0, true, false),
             (Spice::Flip, 1) => flip(dice.byte(), dice.percent(50), false),
             (Spice::Flip, _) => flip(1 << dice.below(8), false, false),
@@ -469,12 +468,12 @@ fn leaves_doubt(act: &Act) -> bool {
             .iter()
             .any(|order| order.spoil.is_some() || order.command == RawCommand::Reset)
     };
-    let own = match &act.what {
+    let spoils = match &act.what {
         ActKind::Talk(talk) => spoiled(talk),
         ActKind::Bytes(_) | ActKind::Zeros(_) | ActKind::Sequence | ActKind::Power { .. } => true,
         ActKind::Synco(_) | ActKind::Pause(_) | ActKind::Recover | ActKind::Wait(_) => false,
     };
-    own || !act.damages.is_empty()
+    spoils || !act.damages.is_empty()
 }
 
 /// A cell of the bus, of the drive's table, or any.

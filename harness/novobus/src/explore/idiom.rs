@@ -197,11 +197,11 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
             false => dice.below(6) as u8,
         };
         let mut bytes = order.bytes();
-        let own = usize::from(at).min(bytes.len() - 1);
-        bytes[own] ^= 1 << dice.below(8);
+        let place = usize::from(at).min(bytes.len() - 1);
+        bytes[place] ^= 1 << dice.below(8);
         order.spoil = Some(Spoil {
             at,
-            byte: bytes[own],
+            byte: bytes[place],
         });
     }
     let cell = order.command.cell();

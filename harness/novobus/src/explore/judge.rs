@@ -109,15 +109,15 @@ impl Judge {
     /// What of the open properties the ring can still have, as places among all that it could have.
     pub(crate) fn possible(&self) -> Vec<u8> {
         let all = (0..).zip(all_properties());
-        let own = all.filter(|(_, own)| self.possible.contains(own));
-        own.map(|(place, _)| place).collect()
+        let possible = all.filter(|(_, properties)| self.possible.contains(properties));
+        possible.map(|(place, _)| place).collect()
     }
 
     /// Limits them to these places.
     pub(crate) fn set_possible(&mut self, places: &[u8]) {
         let all = (0..).zip(all_properties());
-        let own = all.filter(|(place, _)| places.contains(place));
-        self.possible = own.map(|(_, own)| own).collect();
+        let possible = all.filter(|(place, _)| places.contains(place));
+        self.possible = possible.map(|(_, properties)| properties).collect();
         self.begin();
     }
 
@@ -178,7 +178,7 @@ impl Judge {
                     continue;
                 };
                 let Some(what) = self.compare(out, must, exchange.received.get(index)) else {
-                    let received = exchange.received.get(index).map_or(0, |own| own.byte);
+                    let received = exchange.received.get(index).map_or(0, |byte| byte.byte);
                     self.model.take((*byte, *role), must, received);
                     index += 1;
                     continue;
@@ -226,7 +226,7 @@ impl Judge {
         let Some(received) = received else {
             return Some(twin::Symptom::Missing);
         };
-        let noticed = out[0].is_some_and(|own| own.error.is_some());
+        let noticed = out[0].is_some_and(|byte| byte.error.is_some());
         if (received.byte ^ must.byte) & !must.open != 0 {
             Some(twin::Symptom::Value)
         } else if self.line_errors && received.error.is_some() != noticed {
@@ -338,7 +338,7 @@ fn around(
 
 /// What arrives of a byte.
 fn harmed(byte: Both, harms: &[Harm]) -> Vec<Both> {
-    let mut own = byte;
+    let mut changed = byte;
     let (mut before, mut again, mut lost) = (Vec::new(), false, false);
     for harm in harms {
         match *harm {
@@ -346,14 +346,14 @@ fn harmed(byte: Both, harms: &[Harm]) -> Vec<Both> {
                 let harness_bench::link::LinkFault::Flip(flips) = harm.fault() else {
                     continue;
                 };
-                own = own.map(|byte| {
+                changed = changed.map(|byte| {
                     byte.map(|byte| Received {
                         byte: byte.byte ^ data,
                         error: byte.error.or(flips.noticed()),
                     })
                 });
             }
-            Harm::Replace(new) => own = own.map(|byte| byte.map(|_| Received::good(new))),
+            Harm::Replace(new) => changed = changed.map(|byte| byte.map(|_| Received::good(new))),
             Harm::Insert(new) => before.push([Some(Received::good(new)); 2]),
             Harm::Duplicate => again = true,
             Harm::Drop => lost = true,
@@ -362,8 +362,8 @@ fn harmed(byte: Both, harms: &[Harm]) -> Vec<Both> {
         }
     }
     if !lost {
-        before.push(own);
-        before.extend(again.then_some(own));
+        before.push(changed);
+        before.extend(again.then_some(changed));
     }
     before
 }

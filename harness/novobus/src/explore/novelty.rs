@@ -44,8 +44,8 @@ pub(crate) fn features(case: &Case, seen: &MasterView, trace: &Trace) -> Vec<u32
         let index = usize::try_from(mark.piece).unwrap_or(usize::MAX);
         let cause = mark.cause().map_or(0, |cause| u32::from(cause.code()));
         let signs = (0..7).fold(0, |signs, bit| {
-            let own = sign(bit);
-            signs | u32::from(mark.marks().contains(own)) << bit
+            let marks = sign(bit);
+            signs | u32::from(mark.marks().contains(marks)) << bit
         });
         found.push(hash(&[3, signs, cause, role_at(index.saturating_sub(1))]));
     }
@@ -54,8 +54,8 @@ pub(crate) fn features(case: &Case, seen: &MasterView, trace: &Trace) -> Vec<u32
     let ring = case.ring();
     if ring > 0 {
         // Features of one ring are independent of those of the other ring.
-        for own in &mut found {
-            *own = hash(&[*own, ring as u32]);
+        for feature in &mut found {
+            *feature = hash(&[*feature, ring as u32]);
         }
     }
     found

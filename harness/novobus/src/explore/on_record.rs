@@ -65,12 +65,13 @@ impl AttemptRecord {
     #[must_use]
     pub(super) fn is_sound(&self) -> bool {
         let mut all = self.before.iter().chain([&self.last]);
-        let ring = |own: &AnsweredCase| (own.case.drives, own.case.ring());
-        let sent = self.before.iter().map(|own| own.case.bytes().len());
-        all.all(|own| own.case.is_kept() && ring(own) == ring(&self.last))
+        let ring = |case: &Case| (case.drives, case.ring());
+        let sent = self.before.iter();
+        let sent = sent.map(|answered| answered.case.bytes().len());
+        all.all(|AnsweredCase { case, .. }| case.is_kept() && ring(case) == ring(&self.last.case))
             && sent.sum::<usize>() <= 2 * LONGEST_HISTORY
             && !self.possible.is_empty()
-            && self.possible.iter().all(|own| *own < 16)
+            && self.possible.iter().all(|place| *place < 16)
     }
 
     /// How the ring differed, judged again.
@@ -82,9 +83,9 @@ impl AttemptRecord {
         let size = RingSize::new(u64::from(last.case.drives)).ok()?;
         let mut judge = Judge::new(last.case.ring(), size, self.line_errors);
         judge.set_possible(&self.possible);
-        for own in before {
+        for answered in before {
             // As in the run, a difference in the first telegram shows again in the case.
-            let exchange = BytesExchanged::of(&own.case, own.received.clone());
+            let exchange = BytesExchanged::of(&answered.case, answered.received.clone());
             let _again = judge.see(exchange).map(|_| judge.begin());
         }
         let exchange = BytesExchanged::of(&last.case, last.received.clone());
@@ -98,7 +99,7 @@ impl AttemptRecord {
 
 /// The acts of conversations behind the first one, which belongs to making the drives ready.
 pub(super) fn acts(before: &[AnsweredCase]) -> Vec<Act> {
-    let cases = before.iter().skip(1).map(|own| &own.case);
+    let cases = before.iter().skip(1).map(|answered| &answered.case);
     cases.flat_map(|case| case.acts.iter().cloned()).collect()
 }
 
@@ -197,7 +198,7 @@ impl OnRecord {
 
     /// The case of the next attempt.
     pub(crate) fn next(&self) -> Option<&Case> {
-        self.left.front().map(|own| &own.last.case)
+        self.left.front().map(|attempt| &attempt.last.case)
     }
 }
 
@@ -207,16 +208,17 @@ impl Target<Case> for OnRecord {
     }
 
     fn attempt(&mut self, case: &Case, _: &Rehearsal) -> Result<Tried, ExploreError> {
-        let own = self.left.pop_front().filter(|own| own.last.case == *case);
-        let own = own.ok_or_else(|| {
+        let next = self.left.pop_front();
+        let next = next.filter(|attempt| attempt.last.case == *case);
+        let attempt = next.ok_or_else(|| {
             ExploreError::File("an attempt at another case was due here".to_owned())
         })?;
-        let difference = own.difference();
-        let acts = acts(&own.before);
+        let difference = attempt.difference();
+        let acts = acts(&attempt.before);
         Ok(Tried {
             before: (difference.is_some() && !acts.is_empty()).then_some(acts),
             difference,
-            not_played: (!own.played).then(|| "the record says so".to_owned()),
+            not_played: (!attempt.played).then(|| "the record says so".to_owned()),
             ..Tried::default()
         })
     }
@@ -237,9 +239,9 @@ const ERRORS: [LineError; 4] = [
 
 /// Writes bytes as a text: `80 00/parity`.
 fn write<S: Serializer>(received: &[Received], serializer: S) -> Result<S::Ok, S::Error> {
-    let bytes = received.iter().map(|own| match own.error {
-        None => format!("{:02X}", own.byte),
-        Some(error) => format!("{:02X}/{}", own.byte, error.name()),
+    let bytes = received.iter().map(|byte| match byte.error {
+        None => format!("{:02X}", byte.byte),
+        Some(error) => format!("{:02X}/{}", byte.byte, error.name()),
     });
     serializer.serialize_str(&bytes.collect::<Vec<_>>().join(" "))
 }
@@ -250,7 +252,7 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Received>, D::
         let (byte, error) = match word.split_once('/') {
             None => (word, None),
             Some((byte, name)) => {
-                let error = ERRORS.into_iter().find(|own| own.name() == name)?;
+                let error = ERRORS.into_iter().find(|error| error.name() == name)?;
                 (byte, Some(error))
             }
         };

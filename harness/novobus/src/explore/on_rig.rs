@@ -113,8 +113,9 @@ impl<'r, 's> OnRig<'r, 's> {
             self.run.leave_as_they_are();
         }
         let session = self.run.session();
-        let drives: Vec<_> = session.axes();
-        let drives: Vec<_> = drives.iter().map(|own| (own.ring(), own.drive())).collect();
+        let axes: Vec<_> = session.axes();
+        let drives = axes.iter().map(|axis| (axis.ring(), axis.drive()));
+        let drives: Vec<_> = drives.collect();
         if self.monitors.is_none() {
             self.monitors = monitors(session.link(), &drives);
         }
@@ -212,7 +213,7 @@ impl Target<Case> for OnRig<'_, '_> {
         let began = std::time::Instant::now();
         let mut made_ready = Span::ZERO;
         let sent = self.history.iter().flatten();
-        let used: usize = sent.map(|own| own.case.bytes().len()).sum();
+        let used: usize = sent.map(|answered| answered.case.bytes().len()).sum();
         // The program has been computing, and drives that monitor time-outs have missed it.
         let waited = self.monitors == Some(true);
         if self.stale || waited || used > LONGEST_HISTORY {

@@ -35,11 +35,11 @@ impl OnSim {
 
     /// How the model itself differs from the expected behaviour.
     fn judge(&self, case: &Case, link: &mut SimulatedLink, trace: &Trace) -> Option<Difference> {
-        let own = match self.setup.is_plain() {
+        let difference = match self.setup.is_plain() {
             true => against_reference(case, link, trace),
             false => against_witnesses(case, link, trace),
         };
-        own.or_else(|| beside(case, link))
+        difference.or_else(|| beside(case, link))
     }
 
     /// The same, but creates rings of these sizes at once, so that errors are reported before a run begins.

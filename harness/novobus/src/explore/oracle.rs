@@ -57,8 +57,8 @@ impl Difference {
     /// Whether another finding is of the same kind: the same symptom, against the same rule of the same section.
     #[must_use]
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let kind = |own: &Self| (own.what, own.section.clone(), own.rule.clone());
-        kind(self) == kind(other)
+        let same_rule = self.section == other.section && self.rule == other.rule;
+        same_rule && self.what == other.what
     }
 
     /// The kind of the finding in words.
@@ -221,14 +221,14 @@ pub(crate) fn against_reference(
             return Some(beside_bus(ring, drive, "error mode", "9.7", ""));
         }
         // The reference model knows one code for every bad byte.
-        let own = link.ring(ring)?.drive(drive)?.cells().ram_and_registers();
-        if own == other.ram_and_registers() {
+        let held = link.ring(ring)?.drive(drive)?.cells().ram_and_registers();
+        if held == other.ram_and_registers() {
             return None;
         }
-        let cells = own.iter().zip(other.ram_and_registers());
+        let cells = held.iter().zip(other.ram_and_registers());
         let mut cells = (0xFD80_u16..=0xFFFF).zip(cells);
-        let differing = cells.find(|(cell, (own, other))| {
-            own != other && ![ram::ERRORCODE, ram::ERRORCODE + 1].contains(cell)
+        let differing = cells.find(|(cell, (held, other))| {
+            held != other && ![ram::ERRORCODE, ram::ERRORCODE + 1].contains(cell)
         });
         differing.map(|(cell, _)| {
             let detail = format!(" {cell:04X}");
@@ -304,7 +304,7 @@ pub(crate) fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
         OtherRing::Second(_) => 1,
     };
     let trace = link.trace(other);
-    let spoke = |own: &Channel| !own.octets().is_empty();
+    let spoke = |link: &Channel| !link.octets().is_empty();
     let place = trace.channels.iter().position(spoke)?;
     let name = link_name(other, trace.stations, place);
     Some(Difference {

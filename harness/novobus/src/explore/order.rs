@@ -32,32 +32,15 @@ pub(crate) struct Spoil {
 #[serde(tag = "command", rename_all = "kebab-case")]
 pub(crate) enum RawCommand {
     /// 10.1.
-    ReadByte {
-        /// The address.
-        cell: u16,
-    },
+    ReadByte { cell: u16 },
     /// 10.1.
-    ReadWord {
-        /// The address.
-        cell: u16,
-    },
+    ReadWord { cell: u16 },
     /// 10.1.
-    ReadLong {
-        /// The address.
-        cell: u16,
-    },
+    ReadLong { cell: u16 },
     /// 10.2.
-    WriteByte {
-        /// The address.
-        cell: u16,
-        data: u8,
-    },
+    WriteByte { cell: u16, data: u8 },
     /// 10.2.
-    WriteWord {
-        /// The address.
-        cell: u16,
-        data: u16,
-    },
+    WriteWord { cell: u16, data: u16 },
     /// 10.3.
     And {
         /// The low byte of the address.

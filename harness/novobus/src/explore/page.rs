@@ -76,13 +76,13 @@ fn reach(kept: &KeptRun, case: &Case, reached: &mut Reached) -> Result<(), Explo
     }
     let mut link = kept.about.setup.model(&case.sizes())?;
     play(&mut link, case);
-    for own in link
+    for link in link
         .trace(case.ring())
         .channels
         .iter()
-        .filter(|own| own.to.is_some())
+        .filter(|link| link.to.is_some())
     {
-        reached.join(&heard(own));
+        reached.join(&heard(link));
     }
     Ok(())
 }
@@ -168,7 +168,7 @@ fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>)
     let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
     let planted = finding.setup.deviates.iter();
     let planted: String = planted
-        .map(|own| format!("\n{}", planted_line(own)))
+        .map(|deviation| format!("\n{}", planted_line(deviation)))
         .collect();
     let text = format!("{head}{planted}\n\n{steps}");
     let source = Source {

@@ -25,8 +25,8 @@ impl Promotes for Case {
         title: &str,
         source: Option<&str>,
     ) -> Result<String, ExploreError> {
-        let own = source.map(|source| vec![source.to_owned()]);
-        scenario(finding, title, &own.unwrap_or_else(|| sources(finding)))
+        let given = source.map(|source| vec![source.to_owned()]);
+        scenario(finding, title, &given.unwrap_or_else(|| sources(finding)))
     }
 
     fn on_deviating(finding: &Finding) -> Result<Option<String>, ExploreError> {

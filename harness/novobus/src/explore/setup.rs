@@ -17,17 +17,17 @@ use serde::{Deserialize, Serialize};
 
 /// The line of a header that plants a deviation.
 #[must_use]
-pub(super) fn planted_line(own: &Planted) -> String {
-    let drive = drive_name(own.ring, own.drive);
-    format!("drive {drive} deviates {}", own.name)
+pub(super) fn planted_line(planted: &Planted) -> String {
+    let drive = drive_name(planted.ring, planted.drive);
+    format!("drive {drive} deviates {}", planted.name)
 }
 
 /// The same as a header; `None` where there is no such deviation.
 #[must_use]
-pub(crate) fn planted_setup(own: &Planted) -> Option<HeaderLine> {
-    let known = deviation::deviation(&own.name)?;
+pub(crate) fn planted_setup(planted: &Planted) -> Option<HeaderLine> {
+    let known = deviation::deviation(&planted.name)?;
     Some(HeaderLine::deviates(
-        DriveRange::one(own.ring, own.drive),
+        DriveRange::one(planted.ring, planted.drive),
         known,
     ))
 }
@@ -49,9 +49,9 @@ impl RingSetup {
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
     pub(crate) fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
-        let own = sim::setup(rig);
-        let mut header = own.only(|setup| planted_by(setup, rig).is_empty());
-        let mut deviates: Vec<_> = own
+        let setup = sim::setup(rig);
+        let mut header = setup.only(|setup| planted_by(setup, rig).is_empty());
+        let mut deviates: Vec<_> = setup
             .setups
             .iter()
             .flat_map(|setup| planted_by(setup, rig))
@@ -92,13 +92,13 @@ impl RingSetup {
         for setup in &mut header.setups {
             setup.drives.ring = 0;
         }
-        let planted = self.deviates.iter().filter(|own| own.ring == ring);
+        let planted = self.deviates.iter().filter(|planted| planted.ring == ring);
         Self {
             header,
             deviates: planted
-                .map(|own| Planted {
+                .map(|planted| Planted {
                     ring: 0,
-                    ..own.clone()
+                    ..planted.clone()
                 })
                 .collect(),
         }
@@ -165,7 +165,7 @@ fn planted_by(setup: &HeaderLine, rig: &Rig) -> Vec<Planted> {
         return Vec::new();
     };
     let DriveRange { ring, from, to } = &setup.drives;
-    let drives = rig.rings().nth(*ring).map_or(0, |(_, own)| own.drives);
+    let drives = rig.rings().nth(*ring).map_or(0, |(_, ring)| ring.drives);
     let number = |end: &Located| {
         let value = end.value(Scope::new(drives.into())).ok();
         value.and_then(|value| u8::try_from(value).ok())

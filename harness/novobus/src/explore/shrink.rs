@@ -251,8 +251,8 @@ impl Shrinker<'_, '_> {
             self.change(|case| {
                 for act in &mut case.acts {
                     if let ActKind::Talk(talk) = &mut act.what {
-                        let own = talk.orders.iter_mut();
-                        own.for_each(|order| order.command = order.command.at(cell, FIRST_CELL));
+                        let orders = talk.orders.iter_mut();
+                        orders.for_each(|order| order.command = order.command.at(cell, FIRST_CELL));
                     }
                 }
             })?;
@@ -311,7 +311,8 @@ impl Shrinker<'_, '_> {
             }
             ActKind::Wait(ms) => {
                 // Just beyond the times of ND21 9.9.
-                for ms in [1, 11, 21, ms / 2].into_iter().filter(|own| *own < ms) {
+                let shorter = [1, 11, 21, ms / 2].into_iter();
+                for ms in shorter.filter(|shorter| *shorter < ms) {
                     if self.change_act(at, |act| act.what = ActKind::Wait(ms))? {
                         break;
                     }
@@ -445,7 +446,7 @@ impl Shrinker<'_, '_> {
 fn shorten(what: &mut ActKind, length: usize) {
     let count = u8::try_from(length).unwrap_or(u8::MAX);
     match what {
-        ActKind::Synco(own) | ActKind::Pause(own) | ActKind::Zeros(own) => *own = count.min(*own),
+        ActKind::Synco(old) | ActKind::Pause(old) | ActKind::Zeros(old) => *old = count.min(*old),
         ActKind::Bytes(bytes) => bytes.truncate(length),
         _ => {}
     }
@@ -515,8 +516,8 @@ fn on_ring(subject: &Subject, drives: u8) -> Subject {
             };
         }
     }
-    let own = new.setup.deviates.iter_mut();
-    for planted in own.filter(|planted| planted.ring == ring) {
+    let planted = new.setup.deviates.iter_mut();
+    for planted in planted.filter(|planted| planted.ring == ring) {
         planted.drive = map(planted.drive);
     }
     new

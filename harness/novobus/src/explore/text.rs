@@ -64,7 +64,7 @@ pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let mut text: Text = Text::default();
     text.header(&Scenario {
         sources: page.sources.iter().map(source).collect(),
-        strict: page.expected.is_some_and(|own| is_strict(case, own)),
+        strict: page.expected.is_some_and(|all| is_strict(case, all)),
         ..Scenario::new(page.title, header)
     });
     text.empty_line();
@@ -74,12 +74,12 @@ pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let mut faults = case.faults().into_iter();
     for act in &case.acts {
         steps(&mut text, act, case);
-        let own = if act.length(case.drives) > 0 {
+        let harms = if act.length(case.drives) > 0 {
             act.damages.len()
         } else {
             0
         };
-        for (link, byte, harm) in faults.by_ref().take(own) {
+        for (link, byte, harm) in faults.by_ref().take(harms) {
             let ends = LinkEnds::of_place(case.drives, usize::from(link));
             let fault = FaultStep::on_link(case.ring(), ends, kind(harm), byte);
             text.step(&RingStep::Fault(fault).into(), "");
@@ -198,11 +198,11 @@ fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
     if received.len() == answering(&roles, &sent).count() {
         let mut rest = (&roles[..], &sent[..]);
         for part in case.acts.iter().flat_map(|act| act.parts(case.drives)) {
-            let (own, later) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
-            let count = answering(own.0, later.0).count();
+            let (roles, sent) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
+            let count = answering(roles.0, sent.0).count();
             answer(text, case, from..from + count, expected);
             from += count;
-            rest = (own.1, later.1);
+            rest = (roles.1, sent.1);
         }
     }
     let step = 4 * ITEMS_A_LINE;

@@ -278,11 +278,11 @@ fn not_blamed(cases: u64) {
     for (number, properties) in (0..).zip(all_properties()) {
         let ring = AnyRing::new(3, properties, Wrong::Nothing, number);
         let (found, not_sent) = run(ring, number, cases, &[]);
-        let told = found.iter().map(|own| {
-            let text = scenario(own, "it was blamed", &[]).unwrap_or_default();
+        let told = found.iter().map(|finding| {
+            let text = scenario(finding, "it was blamed", &[]).unwrap_or_default();
             format!(
                 "{} confirmed {}\n{text}",
-                own.difference.about, own.confirmed
+                finding.difference.about, finding.confirmed
             )
         });
         let told: Vec<_> = told.collect();

@@ -103,8 +103,8 @@ fn between_error_and_recovery(tour: &Tour<'_>, dice: &mut Dice) -> Vec<Act> {
 pub(crate) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let unknown = (0..=u8::MAX).filter(|code| layout(*code, ReadLongAnswer::FourData).is_none());
     let forms = unknown.flat_map(|code| [(code, 0), (code, 1), (code, 2)]);
-    let own = tour.share(drive, shuffled(forms.collect(), &mut Dice::new(1)));
-    let groups = own.into_iter().map(|(code, form)| {
+    let codes = tour.share(drive, shuffled(forms.collect(), &mut Dice::new(1)));
+    let groups = codes.into_iter().map(|(code, form)| {
         let (cell, data) = (spare(dice), dice.byte());
         let (low, page) = (cell as u8, page_cell(dice) as u8);
         let mut command = vec![code];
@@ -188,8 +188,8 @@ pub(crate) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
 /// Every byte that is no sync byte, and what stands behind it (9.2, 9.7).
 pub(crate) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let bad = (0..=u8::MAX).filter(|byte| SyncByte::decode(*byte).is_err());
-    let own = tour.share(drive, bad.collect());
-    let groups = shuffled(own, dice).into_iter().map(|byte| {
+    let bytes = tour.share(drive, bad.collect());
+    let groups = shuffled(bytes, dice).into_iter().map(|byte| {
         let mut acts = vec![
             talk(drive, &[RawCommand::ReadByte { cell: spare(dice) }]),
             Act::sound(ActKind::Bytes(vec![byte])),
@@ -211,8 +211,8 @@ pub(crate) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> V
             }
         }
     }
-    let own = tour.share(drive, shuffled(all, &mut Dice::new(0)));
-    let groups = own.into_iter().map(|(broken, breaker, zeros)| {
+    let sequences = tour.share(drive, shuffled(all, &mut Dice::new(0)));
+    let groups = sequences.into_iter().map(|(broken, breaker, zeros)| {
         let mut bytes = SEQUENCE[..broken].to_vec();
         bytes.push(breaker);
         // What broke it may be its first byte again.

@@ -54,7 +54,7 @@ struct Tour<'s> {
 /// The cases for a ring, in the order in which they are tried.
 #[must_use]
 pub(crate) fn tour(scope: &CaseScope, ring: &RingScope, seed: u64) -> Vec<Case> {
-    let own = Tour {
+    let tour = Tour {
         ring,
         drives: visited(ring.drives),
         resets: scope.limits.reset && scope.limits.motion,
@@ -65,10 +65,10 @@ pub(crate) fn tour(scope: &CaseScope, ring: &RingScope, seed: u64) -> Vec<Case> 
             continue;
         }
         let mut dice = Dice::of_part(seed ^ 0x5EED, number);
-        let each = own
+        let each = tour
             .drives
             .iter()
-            .map(|drive| family(&own, *drive, &mut dice));
+            .map(|drive| family(&tour, *drive, &mut dice));
         for (turn, cases) in (0..).zip(each.collect::<Vec<_>>()) {
             let count = u32::try_from(cases.len().max(1)).unwrap_or(u32::MAX);
             let share = |at: usize| {
@@ -120,10 +120,10 @@ impl Tour<'_> {
         let place = self
             .drives
             .iter()
-            .position(|own| *own == drive)
+            .position(|visited| *visited == drive)
             .unwrap_or(0);
-        let own = all.into_iter().skip(place);
-        own.step_by(self.drives.len().max(1)).collect()
+        let shared = all.into_iter().skip(place);
+        shared.step_by(self.drives.len().max(1)).collect()
     }
 }
 
