@@ -193,8 +193,8 @@ pub(crate) fn recover_up_to(link: &mut dyn Line, ring: usize, drives: u16) -> Re
         None => reported(link, ring, MAX_DRIVES),
     };
     let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
-    let own = |drive: &u8| !(zeros_unasked && *drive == 0);
-    let (before, after) = (before.filter(own), after.filter(own));
+    let counts = |drive: &u8| !(zeros_unasked && *drive == 0);
+    let (before, after) = (before.filter(counts), after.filter(counts));
     let before = before.map(|drive| SpelledOut {
         drive,
         why: drives.map_or(SpellingCause::Fault, |size| why(link, ring, drive, size)),

@@ -36,21 +36,16 @@ pub enum Error {
     /// The drive is in error mode.
     #[error("drive {axis} is in error mode: {}", in_words(*code))]
     InErrorMode {
-        /// The drive.
         axis: Axis,
         /// Its error code.
         code: u16,
     },
     /// The drive still tests itself.
     #[error("drive {axis} is in reset: its self-test still runs (ND21 11.8)")]
-    InReset {
-        /// The drive.
-        axis: Axis,
-    },
+    InReset { axis: Axis },
     /// A stop or a block has ended what was going on.
     #[error("drive {axis}: {what} was interrupted by {by} (ND21 13.2.1.1)")]
     Interrupted {
-        /// The drive.
         axis: Axis,
         what: &'static str,
         /// `stop` or `block`.
@@ -62,7 +57,6 @@ pub enum Error {
         counted(*.attempts, "attempt")
     )]
     NotSet {
-        /// The drive.
         axis: Axis,
         /// How far it is off.
         deviation: i32,

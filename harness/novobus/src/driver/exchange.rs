@@ -11,7 +11,7 @@ impl OpenRings<'_> {
     /// ends the work of the bus.
     pub(crate) fn exchange(&self, values: &[(Axis, u16)]) -> Result<Vec<u16>, Error> {
         let ring = values.first().map_or(0, |(axis, _)| axis.ring());
-        let own: Vec<u8> = values.iter().map(|(axis, _)| axis.drive()).collect();
+        let drives: Vec<u8> = values.iter().map(|(axis, _)| axis.drive()).collect();
         if values.is_empty() || values.iter().any(|(axis, _)| axis.ring() != ring) {
             let text = "process data are exchanged with drives of one ring";
             return Err(Error::Value(text.to_owned()));
@@ -28,7 +28,7 @@ impl OpenRings<'_> {
         for (axis, value) in values {
             master.set_nominal(axis.drive(), *value).map_err(refused)?;
         }
-        let set = master.set_exchange(&own, CyclePace::OnRequest);
+        let set = master.set_exchange(&drives, CyclePace::OnRequest);
         set.map_err(refused)?;
         master.start_round();
         pump.speak(ring);
@@ -40,12 +40,12 @@ impl OpenRings<'_> {
             let master = pump.master(ring).ok_or_else(no_ring)?;
             let done = master.counters().rounds > before;
             if done || now >= end {
-                let actual = own.iter().filter_map(|drive| master.actual(*drive));
+                let actual = drives.iter().filter_map(|drive| master.actual(*drive));
                 let actual: Vec<u16> = actual.collect();
                 master
                     .set_exchange(&[], CyclePace::OnRequest)
                     .map_err(refused)?;
-                if done && actual.len() == own.len() {
+                if done && actual.len() == drives.len() {
                     return Ok(actual);
                 }
                 return Err(Error::TimeOut {

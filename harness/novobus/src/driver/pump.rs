@@ -49,7 +49,7 @@ impl<'l> Masters<'l> {
     pub(crate) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
         // A late byte must not count as lost, because the recovery stops every drive.
-        let own = master::MasterOptions {
+        let master_options = master::MasterOptions {
             slack: match link.lead() {
                 Lead::NONE => options.master.slack,
                 _ => options.master.slack.max(BUSY_HOST),
@@ -61,7 +61,7 @@ impl<'l> Masters<'l> {
             .find(|rate| rate.byte_time() == link.byte_time())
             .unwrap_or_default();
         let rings = sizes.iter().map(|&size| Ring {
-            master: AnyMaster::new(size, rate, own, options.deviates),
+            master: AnyMaster::new(size, rate, master_options, options.deviates),
             free: now,
             home: now,
             idle: false,
@@ -94,10 +94,10 @@ impl<'l> Masters<'l> {
     }
 
     pub(crate) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
-        let Some(own) = self.rings.get(ring) else {
+        let Some(Ring { master, .. }) = self.rings.get(ring) else {
             return false;
         };
-        let bytes = telegram(own.master.ring(), drive, command);
+        let bytes = telegram(master.ring(), drive, command);
         self.link.permits(ring, Out::Octets(&bytes))
     }
 

@@ -246,8 +246,8 @@ fn location(scanner: &mut Scanner<'_>) -> Result<MemoryRange, Problem> {
     } else {
         (MemoryKind::Ram, place(scanner)?)
     };
-    let own = place.cell.and_then(|cell| cell.scale);
-    let mut scales = [place.scale(), own].into_iter().flatten();
+    let of_cell = place.cell.and_then(|cell| cell.scale);
+    let mut scales = [place.scale(), of_cell].into_iter().flatten();
     let size = if scanner.eat(":") {
         let here = scanner.here();
         let length = expression::plain(scanner)?;

@@ -190,7 +190,7 @@ impl Language for Novobus {
 
     fn fits(header: &Header, drives: u8) -> bool {
         let range = header.rings.first();
-        range.is_some_and(|own| own.contains(drives))
+        range.is_some_and(|range| range.contains(drives))
     }
 
     fn next_look(state: &RunState) -> Instant {

@@ -37,7 +37,7 @@ impl RingScenario {
     /// Its mistakes.
     pub(crate) fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
         let scenario: Scenario = parse(&source)?;
-        let size = drives.filter(|own| Novobus::fits(&scenario.header, *own));
+        let size = drives.filter(|size| Novobus::fits(&scenario.header, *size));
         Self::settled(scenario, source, size)
     }
 

@@ -315,8 +315,8 @@ fn condition(scanner: &mut Scanner<'_>, others: &[&'static str]) -> Result<Condi
     if let Some(place) = cell_by_name(scanner) {
         return Ok(Condition::Cell(cell_check(scanner, place)?));
     }
-    let own = CONDITIONS.iter().map(|(name, _)| *name);
-    let known: Vec<_> = others.iter().copied().chain(own).collect();
+    let conditions = CONDITIONS.iter().map(|(name, _)| *name);
+    let known: Vec<_> = others.iter().copied().chain(conditions).collect();
     let expected = if others.is_empty() {
         format!("a condition ({}, or a cell's name)", known.join(", "))
     } else {

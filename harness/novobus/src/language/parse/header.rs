@@ -39,8 +39,8 @@ pub(crate) fn line(
         })),
         "line" => Some(rate(scanner).and_then(|rate| once(&mut header.rate, rate, word))),
         "master" => {
-            let own = scanner.eat_word(DEVIATES);
-            own.then(|| deviating_master(word, scanner, header, begun))
+            let deviates = scanner.eat_word(DEVIATES);
+            deviates.then(|| deviating_master(word, scanner, header, begun))
         }
         name if drive::WORDS.contains(&name) => drive_line(word, scanner, header, begun),
         _ => None,
@@ -128,9 +128,9 @@ pub(crate) fn parse_lines(source: &Source) -> Result<Header, Problems> {
 
 /// The mistake in the `ring` line of a header that is not for rings of these sizes.
 pub(crate) fn for_other_rings(header: &Header, rings: &[u8]) -> Option<Problem> {
-    let own = &header.rings;
+    let ranges = &header.rings;
     let fits = |(range, size): (&RingRange, &u8)| range.contains(*size);
-    if own.is_empty() || own.len() == rings.len() && own.iter().zip(rings).all(fits) {
+    if ranges.is_empty() || ranges.len() == rings.len() && ranges.iter().zip(rings).all(fits) {
         return None;
     }
     let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
@@ -139,7 +139,7 @@ pub(crate) fn for_other_rings(header: &Header, rings: &[u8]) -> Option<Problem> 
         _ => format!("the rig has {} drives", sizes.join(" and ")),
     };
     let expected = "no `ring` line, or its sizes, expected here";
-    Some(Problem::new(own[0].span, what, expected))
+    Some(Problem::new(ranges[0].span, what, expected))
 }
 
 /// `100`, `3..250 default 100`, and a second ring behind a comma.

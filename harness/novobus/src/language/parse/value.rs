@@ -19,8 +19,8 @@ const BEHIND: [&str; 3] = ["+-", "±", "within"];
 
 /// Every name of a RAM cell.
 pub(crate) fn cell_names() -> impl Iterator<Item = &'static str> {
-    let own = cells::RAM.iter().map(|cell| cell.printed);
-    own.chain([POSITION.0])
+    let printed = cells::RAM.iter().map(|cell| cell.printed);
+    printed.chain([POSITION.0])
 }
 
 /// A RAM cell by its printed name (ND21 14.2.1), which may have blanks and signs in it; `None` where no
@@ -89,8 +89,8 @@ pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<CellPlace, Problem> {
 /// An EEPROM cell: two hexadecimal digits, its printed name, or the name of the RAM cell that is loaded
 /// from it (ND21 14.2.2).
 pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<CellPlace, Problem> {
-    let own = eeprom::EEPROM.iter().map(|cell| (cell.printed, cell));
-    if let Some(place) = named(scanner, own) {
+    let cells = eeprom::EEPROM.iter().map(|cell| (cell.printed, cell));
+    if let Some(place) = named(scanner, cells) {
         return Ok(place);
     }
     if let Some(place) = cell_by_name(scanner) {

@@ -31,14 +31,14 @@ fn one_of<T>(
     find: impl Fn(&str) -> Option<T>,
     names: &[&str],
     others: &[&str],
-    (own, other, line): (&str, &str, &str),
+    (whose, other, line): (&str, &str, &str),
 ) -> Result<T, Problem> {
     let before = scanner.clone();
     let word = scanner.word().map_or("", |word| word.value);
     find(word).ok_or_else(|| {
         *scanner = before;
         let expected =
-            format!("the name of a deviation of {own} (`drivebench deviations` lists them)");
+            format!("the name of a deviation of {whose} (`drivebench deviations` lists them)");
         let problem = scanner.unexpected(&expected);
         match others.contains(&word) {
             true => problem.help(format!("{word} is a deviation of {other}: {line}")),

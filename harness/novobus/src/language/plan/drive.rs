@@ -59,18 +59,20 @@ impl Planner {
 
     fn cell(&self, drives: &DriveRange, check: &CellCheck) -> Result<PlannedCell, Problem> {
         let place = &check.place;
-        let own = place.cell.map_or(1, |cell| usize::from(cell.size));
-        let whole = place.scale().map_or(own, |scale| usize::from(scale.size()));
+        let width = place.cell.map_or(1, |cell| usize::from(cell.size));
+        let whole = place
+            .scale()
+            .map_or(width, |scale| usize::from(scale.size()));
         let (size, test) = match &check.value {
             Written::Number(_) | Written::Off(_) => (whole, self.number_test(drives, check)?),
             Written::Bytes(pattern) => {
                 let bytes = pattern.expand(self.size(drives.ring), MAX_CELLS)?;
                 // Both words of a position, or the beginning of a cell that is no number.
-                let fits = bytes.len() == own
+                let fits = bytes.len() == width
                     || bytes.len() == whole
-                    || own > NUMBER && (1..own).contains(&bytes.len());
+                    || width > NUMBER && (1..width).contains(&bytes.len());
                 if !fits {
-                    return Err(wrong_length(place, pattern, bytes.len(), own));
+                    return Err(wrong_length(place, pattern, bytes.len(), width));
                 }
                 let size = bytes.len();
                 let test = match (&check.mask, check.relation) {
@@ -174,8 +176,8 @@ impl Planner {
     pub(crate) fn record(&self, recording: &CellRecording) -> Result<PlannedRecord, Problem> {
         let place = &recording.place;
         let scale = place.scale();
-        let own = place.cell.map_or(1, |cell| usize::from(cell.size));
-        let size = scale.map_or(own, |scale| usize::from(scale.size()));
+        let width = place.cell.map_or(1, |cell| usize::from(cell.size));
+        let size = scale.map_or(width, |scale| usize::from(scale.size()));
         if size > NUMBER {
             return Err(Problem::new(
                 place.span,

@@ -372,8 +372,8 @@ fn with_reading(action: RingAct, reading: Option<NumberCheck>) -> RingAct {
 
 /// The scale of the number of `width` bytes that begins at a place.
 fn scale_of(place: &CellPlace, width: usize) -> Result<Scale, Problem> {
-    let own = place.cell.and_then(|cell| cell.scale);
-    let scales = [own, place.scale()].into_iter().flatten();
+    let of_cell = place.cell.and_then(|cell| cell.scale);
+    let scales = [of_cell, place.scale()].into_iter().flatten();
     let mut fitting = scales.filter(|scale| usize::from(scale.size()) == width);
     fitting.next().ok_or_else(|| {
         let size = place.cell.map_or(1, |cell| usize::from(cell.size));

@@ -45,7 +45,7 @@ pub(crate) fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<P
     };
     settle(header).map_err(|mistakes: Problems| {
         // What was put together from several texts has its places in none of them.
-        match parse_lines(&source).and_then(|own| settle(&own)) {
+        match parse_lines(&source).and_then(|header| settle(&header)) {
             Err(placed) => placed,
             Ok(_) => mistakes,
         }
@@ -85,7 +85,7 @@ pub(crate) fn settle(
             rings: sizes(scenario, size)?,
             sizes: {
                 let ranges = header.rings.iter();
-                ranges.map(|own| (own.smallest, own.largest)).collect()
+                ranges.map(|size| (size.smallest, size.largest)).collect()
             },
             rate: header.rate.unwrap_or_default(),
             master: header.master.as_ref().map(|master| master.value),

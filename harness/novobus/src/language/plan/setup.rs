@@ -188,7 +188,7 @@ impl Planner {
     fn idle(&self, setup: &Setup) -> Option<Problem> {
         let (what, span) = match &setup.what {
             SetupKind::Time(name, _) | SetupKind::Word(name, _)
-                if PROPERTIES.iter().any(|own| own.name == name.value) =>
+                if PROPERTIES.iter().any(|known| known.name == name.value) =>
             {
                 (format!("`{}`", name.value), name.span)
             }
@@ -237,9 +237,9 @@ pub(crate) fn model_unless_said(scenario: &Scenario<Novobus>) -> Model {
         .any(|setup| match &setup.what {
             SetupKind::Influence(Influence::Stimuli(_)) => true,
             SetupKind::Deviates(deviation) => deviation.is_behind_the_bus(),
-            SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
-                PROPERTIES.iter().any(|own| own.name == name.value)
-            }
+            SetupKind::Word(name, _) | SetupKind::Time(name, _) => PROPERTIES
+                .iter()
+                .any(|property| property.name == name.value),
             _ => false,
         });
     let shows = |check: &DriveCheck| matches!(check.condition, Condition::Shows(_));
@@ -320,12 +320,12 @@ pub(crate) fn in_memory(place: &CellPlace, length: usize) -> Result<(), Problem>
 }
 
 fn set_property(name: &str, setting: Setting<'_>, span: TextSpan) -> Result<(), Problem> {
-    if let Some(own) = PROPERTIES.iter().find(|own| own.name == name) {
-        if own.set(&mut Nd21Properties::default(), setting) {
+    if let Some(property) = PROPERTIES.iter().find(|property| property.name == name) {
+        if property.set(&mut Nd21Properties::default(), setting) {
             return Ok(());
         }
         let message = format!("`{name}` cannot be set to this");
-        let expected = format!("{} expected here", own.values());
+        let expected = format!("{} expected here", property.values());
         return Err(Problem::new(span, message, expected));
     }
     Properties::default().set(name, setting).map_err(|error| {

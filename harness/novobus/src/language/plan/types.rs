@@ -225,7 +225,6 @@ pub enum PlannedCall {
     WriteEeprom(u8, u8),
     /// The parameters into the EEPROM.
     RamToEeprom,
-    /// A referencing run.
     Reference,
     /// The rotor's present place has this position.
     SetActualValue(u32),
@@ -261,7 +260,6 @@ pub struct PlannedRecord {
 /// When a recorded cell is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlannedLooks {
-    /// Every so often.
     Every(Span),
     /// Every [`LOOK`]; what changes is noted.
     Changes,

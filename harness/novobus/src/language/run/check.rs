@@ -83,10 +83,11 @@ pub(crate) fn check(
                 ));
             }
             let took = runner.own.sent_to.since(runner.own.sent_from);
-            let own = runner.link.time_tolerance();
+            let of_link = runner.link.time_tolerance();
             match time {
                 Some((time, tolerance))
-                    if took + *tolerance + own < *time || *time + *tolerance + own < took =>
+                    if took + *tolerance + of_link < *time
+                        || *time + *tolerance + of_link < took =>
                 {
                     failed(format!(
                         "the {} took {took}, expected {time}",
@@ -111,7 +112,7 @@ pub(crate) fn check(
 
 /// Whether all commands of the driver's last job have ended so.
 fn all_ended(runner: &Runner<'_>, ending: Ending, span: TextSpan) -> Result<(), Stop> {
-    let other = runner.own.ended.iter().find(|own| **own != ending);
+    let other = runner.own.ended.iter().find(|ended| **ended != ending);
     let message = match (runner.own.ended.is_empty(), other) {
         (false, None) => return Ok(()),
         (true, _) => "the driver has had no command before".to_owned(),

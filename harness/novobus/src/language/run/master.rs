@@ -139,12 +139,12 @@ pub(crate) fn master(
 
 /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
 fn ask(runner: &mut Runner<'_>, ring: usize, calls: &[(u8, PlannedCall)]) {
-    let Some(own) = runner.own.rings.get_mut(ring) else {
+    let Some(record) = runner.own.rings.get_mut(ring) else {
         return;
     };
-    let own = &mut own.asked;
+    let asked = &mut record.asked;
     for (drive, call) in calls {
-        match (call, &mut *own) {
+        match (call, &mut *asked) {
             (PlannedCall::Command(command, _), Some(asked)) => asked.push((*drive, *command)),
             (PlannedCall::Exchange(..), _) => {}
             (_, asked) => *asked = None,
@@ -160,12 +160,13 @@ pub(crate) fn rules_kept(runner: &Runner<'_>, ring: usize, span: TextSpan) -> Re
     let sent = record.into_iter().flat_map(|record| &record.sent);
     let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
     let asked = record.and_then(|record| record.asked.as_deref());
-    let own = |wrong: String| format!("of the bench's own master: {wrong}");
-    conduct(drives, &sent, asked).map_err(|wrong| Stop::failed(span, own(wrong.to_string())))?;
+    let of_master = |wrong: String| format!("of the bench's own master: {wrong}");
+    let failed = |message: String| Stop::failed(span, of_master(message));
+    conduct(drives, &sent, asked).map_err(|wrong| failed(wrong.to_string()))?;
     let Some(gap) = runner.own.gap else {
         return Ok(());
     };
-    let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
+    let message = of_master(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
     Err(match runner.link.time_tolerance() {
         Span::ZERO => Stop::failed(span, message),
         _ => Stop::marginal(span, message + ": the computer was busy"),

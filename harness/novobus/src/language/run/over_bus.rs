@@ -167,9 +167,9 @@ fn exchange_all(
     }
     let mut rest = received.as_slice();
     let data = exchanges.iter().map(|exchange| {
-        let (own, others) = rest.split_at(exchange.expected.len());
+        let (answer, others) = rest.split_at(exchange.expected.len());
         rest = others;
-        exchange.data.iter().map(|place| own[*place].1.byte)
+        exchange.data.iter().map(|place| answer[*place].1.byte)
     });
     Some(data.map(Iterator::collect).collect())
 }
@@ -284,8 +284,8 @@ pub(crate) fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), 
 pub(crate) fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotReady> {
     link.begin();
     let cells = in_each(all, nd21::ram::STATUS);
-    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        reset_ring(link, own)?;
+    for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
+        reset_ring(link, of_ring)?;
     }
     let rings = cells.last().map_or(0, |cell| cell.ring + 1);
     let end = link.now() + SELF_TEST;
@@ -325,12 +325,12 @@ pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool>
     let cells = in_each(all, nd21::ram::FLAGS2);
     let monitors = |data: &Vec<u8>| {
         data.iter()
-            .any(|own| own & nd21::bits::flags2::MONITORING != 0)
+            .any(|flags| flags & nd21::bits::flags2::MONITORING != 0)
     };
     let mut any = Some(false);
     // Every ring is asked: the model reads the answers in the record.
-    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        let flags = together(link, own, Before::read);
+    for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
+        let flags = together(link, of_ring, Before::read);
         let here = flags.map(|flags| flags.iter().any(monitors));
         any = any.zip(here).map(|(any, here)| any || here);
     }
@@ -473,7 +473,6 @@ struct Before {
     /// In which ring, counted from 0.
     ring: usize,
     drive: u8,
-    /// Which cell.
     address: u16,
     /// What it held.
     data: u8,
@@ -503,8 +502,8 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
     for (ring, drives, address, bytes) in plan.memory_setups() {
         let mut cells = Vec::new();
         for drive in drives {
-            let own = (address..=u16::MAX).zip(bytes);
-            cells.extend(own.map(|(address, data)| Before {
+            let contents = (address..=u16::MAX).zip(bytes);
+            cells.extend(contents.map(|(address, data)| Before {
                 ring,
                 drive,
                 address,
@@ -547,8 +546,8 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
     for ring in 0..2 {
         let mut bytes = CHECK_SEQUENCE.to_vec();
         for cell in before.iter().rev().filter(|cell| cell.ring == ring) {
-            let own = Exchange::new(link.drives(ring), cell.drive, cell.write());
-            bytes.extend(own.into_iter().flat_map(|exchange| exchange.bytes));
+            let written = Exchange::new(link.drives(ring), cell.drive, cell.write());
+            bytes.extend(written.into_iter().flat_map(|exchange| exchange.bytes));
         }
         if bytes.len() > CHECK_SEQUENCE.len() {
             let left = link.send_octets(ring, &bytes);
@@ -588,10 +587,10 @@ fn read(link: &mut dyn Link, cell: Before) -> Result<u8, NotReady> {
 /// What each of these cells holds, those of a ring together. Where not all answer it is each for itself, and a sentence for those that do not.
 fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> {
     let mut held = Vec::new();
-    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        match together(link, own, Before::read) {
+    for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
+        match together(link, of_ring, Before::read) {
             Some(data) => held.extend(data.concat().into_iter().map(Ok)),
-            None => held.extend(own.iter().map(|cell| read(link, *cell))),
+            None => held.extend(of_ring.iter().map(|cell| read(link, *cell))),
         }
     }
     held
@@ -602,11 +601,11 @@ fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> 
 /// # Errors
 /// The first one that does not answer, in a sentence.
 fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
-    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        if together(link, own, Before::write).is_some() {
+    for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
+        if together(link, of_ring, Before::write).is_some() {
             continue;
         }
-        for cell in own {
+        for cell in of_ring {
             if exchange(link, cell.ring, cell.drive, cell.write()).is_none() {
                 return Err(NotReady::new(*cell, Unready::NoAnswer, "no answer"));
             }

@@ -91,33 +91,33 @@ impl RunState {
         }
         self.sent += bytes.len() as u64;
         self.sent_to = to;
-        if let Some(own) = self.rings.get_mut(ring) {
-            own.sent.extend(bytes.iter().map(|byte| (*byte, true)));
+        if let Some(ring) = self.rings.get_mut(ring) {
+            ring.sent.extend(bytes.iter().map(|byte| (*byte, true)));
         }
     }
 
     /// Notes the last byte of what a ring has returned.
     pub(crate) fn received(&mut self, ring: usize, all: &[(Instant, Received)]) {
-        let Some(own) = self.rings.get_mut(ring) else {
+        let Some(ring) = self.rings.get_mut(ring) else {
             return;
         };
-        if ends_with_sequence(&all[own.since_recovery..]) {
-            own.since_recovery = all.len();
+        if ends_with_sequence(&all[ring.since_recovery..]) {
+            ring.since_recovery = all.len();
             self.corrected += 1;
         }
     }
 
     /// A line sends by itself what the driver is not asked for.
     pub(crate) fn by_hand(&mut self, ring: usize) {
-        if let Some(own) = self.rings.get_mut(ring) {
-            own.asked = None;
+        if let Some(ring) = self.rings.get_mut(ring) {
+            ring.asked = None;
         }
     }
 }
 
 fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
-    let pairs = received.iter().rev().zip(SEQUENCE.iter().rev());
-    received.len() >= SEQUENCE.len() && pairs.into_iter().all(|((_, byte), own)| byte.is(*own))
+    let mut pairs = received.iter().rev().zip(SEQUENCE.iter().rev());
+    received.len() >= SEQUENCE.len() && pairs.all(|((_, byte), due)| byte.is(*due))
 }
 
 /// What differs, byte by byte.
@@ -132,9 +132,9 @@ pub(crate) fn difference(
         _ => usize::MAX,
     };
     // A checking byte is shown as the byte that it must be, where that is known.
-    let expected = wanted.iter().enumerate().map(|(i, own)| {
+    let expected = wanted.iter().enumerate().map(|(i, byte)| {
         let before = received.get(..i);
-        before.map_or(*own, |before| resolve(*own, before))
+        before.map_or(*byte, |before| resolve(*byte, before))
     });
     ByteDifference {
         ring,

@@ -22,15 +22,15 @@ const LOOK: Span = Span::from_millis(10);
 /// Looks at the links around drives, where the link itself does not show their error mode.
 pub(crate) fn tap(runner: &mut Runner<'_>, ring: usize, drives: RangeInclusive<u8>) {
     let size = runner.link.drives(ring);
-    let listens = |own: &Runner<'_>, drive: u8| {
+    let listens = |runner: &Runner<'_>, drive: u8| {
         let place = usize::from(size.saturating_sub(drive));
         drive < size
             && [place - 1, place]
                 .iter()
-                .all(|p| own.link.listens(ring, *p))
+                .all(|p| runner.link.listens(ring, *p))
     };
     super::over_bus::forget_answers(runner);
-    let hidden = |own: &Runner<'_>, drive: u8| own.link.error_of(ring, drive).is_none();
+    let hidden = |runner: &Runner<'_>, drive: u8| runner.link.error_of(ring, drive).is_none();
     let wanted: Vec<_> = drives
         .filter(|drive| hidden(runner, *drive) && listens(runner, *drive))
         .collect();
@@ -51,7 +51,7 @@ pub(crate) fn tap(runner: &mut Runner<'_>, ring: usize, drives: RangeInclusive<u
 
 /// What a link has carried. The port of a tap may be slower than that of the ring: each link carries as many bytes as have come round.
 fn column(runner: &mut Runner<'_>, ring: usize, place: usize) -> Option<Vec<Received>> {
-    let round = runner.ports.get(ring).map_or(0, |own| own.received.len());
+    let round = runner.ports.get(ring).map_or(0, |port| port.received.len());
     let end = runner.link.now() + PATIENCE;
     loop {
         let column = runner.link.tapped(ring, place)?;
@@ -115,7 +115,7 @@ mod tests {
 
     fn of(input: &[u8], output: &[u8]) -> Option<Option<u16>> {
         let good = |bytes: &[u8]| -> Vec<_> { bytes.iter().map(|b| Received::good(*b)).collect() };
-        shown(&good(input), &good(output)).map(|own| own.map(BusError::code))
+        shown(&good(input), &good(output)).map(|error| error.map(BusError::code))
     }
 
     #[test]

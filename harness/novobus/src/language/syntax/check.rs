@@ -24,11 +24,7 @@ pub enum Check {
     /// Something holds of drives.
     Drive(DriveCheck),
     /// This drive's error mode has this cause.
-    Error {
-        /// The cause.
-        error: BusError,
-        drive: DriveRange,
-    },
+    Error { error: BusError, drive: DriveRange },
     /// This number of check sequences came back whole.
     Corrected(Located),
     /// The driver named this link as the first fault of its last job.
@@ -80,8 +76,8 @@ impl Ending {
     /// The name in a scenario.
     #[must_use]
     pub fn name(self) -> &'static str {
-        let own = Self::NAMES.iter().find(|(_, ending)| *ending == self);
-        own.map_or("", |(name, _)| name)
+        let known = Self::NAMES.iter().find(|(_, ending)| *ending == self);
+        known.map_or("", |(name, _)| name)
     }
 }
 

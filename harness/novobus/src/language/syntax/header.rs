@@ -137,7 +137,7 @@ impl Header {
     pub(crate) fn without_deviations(&self) -> Self {
         Self {
             master: None,
-            ..self.only(|own| !matches!(own.what, SetupKind::Deviates(_)))
+            ..self.only(|setup| !matches!(setup.what, SetupKind::Deviates(_)))
         }
     }
 

@@ -22,7 +22,6 @@ pub enum JobStep {
     },
     /// A command to a drive.
     Command {
-        /// Which command.
         kind: JobKind,
         drive: DriveRange,
         /// The cell, where the command has one.

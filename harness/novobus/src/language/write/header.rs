@@ -26,15 +26,15 @@ pub(crate) fn lines(header: &Header) -> Vec<String> {
 }
 
 /// A line about drives: `drive 3 model nd21`.
-pub(crate) fn setup(own: &Setup) -> String {
-    format!("drive {} {}", drives(&own.drives), kind(&own.what))
+pub(crate) fn setup(setup: &Setup) -> String {
+    format!("drive {} {}", drives(&setup.drives), kind(&setup.what))
 }
 
 /// The lines of a header that begin with `drive` or `master`.
 pub(crate) fn devices(header: &Header) -> Vec<String> {
     let setups = header.setups.iter();
     let master = header.master.iter();
-    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    let master = master.map(|master| format!("master deviates {}", master.value.name));
     setups.map(setup).chain(master).collect()
 }
 
@@ -55,7 +55,7 @@ fn kind(what: &SetupKind) -> String {
         }
         SetupKind::Model(model) => format!("model {}", named(&Model::NAMES, *model)),
         SetupKind::Type(device) => format!("type {}", named(&DEVICES, *device)),
-        SetupKind::Influence(own) => influence(own),
+        SetupKind::Influence(what) => influence(what),
         SetupKind::Word(name, word) => format!("property {} = {}", name.value, word.value),
         SetupKind::Time(name, time) => format!("property {} = {time}", name.value),
         SetupKind::Deviates(deviation) => format!("deviates {}", deviation.name),

@@ -30,7 +30,8 @@ pub(crate) fn job(job: &JobStep) -> String {
             tolerance.as_ref(),
         ),
         JobStep::Master { calls, once } => {
-            let calls: Vec<_> = calls.iter().map(|(drive, own)| call(drive, own)).collect();
+            let calls = calls.iter().map(|(drive, asked)| call(drive, asked));
+            let calls: Vec<_> = calls.collect();
             let once = if *once { "once " } else { "" };
             format!("master {once}{}", calls.join("; "))
         }
@@ -51,7 +52,7 @@ fn command(
 ) -> String {
     let form = FORMS.iter().find(|form| form.kind == kind);
     let name = form.map_or("", |form| form.name);
-    let place = place.map(|own| format!(" {}", cell::place(own)));
+    let place = place.map(|place| format!(" {}", cell::place(place)));
     let data = data.map(|data| format!(" = {}", cell::value(data)));
     let text = format!(
         "{name} {}{}{}",
@@ -81,11 +82,11 @@ fn call(drive: &DriveRange, call: &MasterCall) -> String {
         MasterCall::WriteEeprom(place, data) => eeprom("write-eeprom", place, Some(data)),
         MasterCall::RamToEeprom => simple("ram-to-eeprom"),
         MasterCall::Reference => simple("reference"),
-        MasterCall::SetActualValue(own) => {
-            format!("{} = {}", simple("set-actual-value"), target(own))
+        MasterCall::SetActualValue(position) => {
+            format!("{} = {}", simple("set-actual-value"), target(position))
         }
         MasterCall::InitPs => simple("init-ps"),
-        MasterCall::WritePs(own) => format!("{} = {}", simple("write-ps"), target(own)),
+        MasterCall::WritePs(position) => format!("{} = {}", simple("write-ps"), target(position)),
         MasterCall::Exchange(send, receive) => {
             format!("exchange {}", exchange(drive, send, receive.as_ref()))
         }

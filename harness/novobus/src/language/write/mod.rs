@@ -59,6 +59,6 @@ const fn which_ring(ring: usize) -> &'static str {
 
 /// The name of a value in a table of names.
 fn named<T: Copy + PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
-    let own = names.iter().find(|(_, known)| *known == value);
-    own.map_or("", |(name, _)| name)
+    let found = names.iter().find(|(_, known)| *known == value);
+    found.map_or("", |(name, _)| name)
 }
