@@ -102,10 +102,10 @@ pub(crate) fn of_self_tests(lasting: Duration) -> impl Iterator<Item = Choice> {
         with: None,
         section: "11.8",
     };
-    let silent = of_drives().filter(|own| own.property == "self-test-bus");
-    let silent = silent.map(move |own| Choice {
+    let silent = of_drives().filter(|choice| choice.property == "self-test-bus");
+    let silent = silent.map(move |choice| Choice {
         with: Some((SELF_TEST_TIME, time.clone())),
-        ..own
+        ..choice
     });
     std::iter::once(alone).chain(silent)
 }

@@ -280,8 +280,8 @@ pub(crate) fn guard_rings<L: Link>(inner: L, limits: Limits) -> Guarded<L> {
         Capability::Reset => limits.reset && limits.motion,
         _ => true,
     };
-    let own = inner.capabilities().iter().copied();
-    let capabilities = own.filter(has).collect();
+    let capabilities = inner.capabilities().iter().copied();
+    let capabilities = capabilities.filter(has).collect();
     Guarded::behind(inner, gates, capabilities)
 }
 
@@ -334,7 +334,8 @@ impl<L: Line> GuardsRings for Guarded<L> {
                 continue;
             };
             for (address, touched) in gate.guard.take_touched() {
-                let axis = gate.drive_at(address).and_then(|own| Axis::new(ring, own));
+                let drive = gate.drive_at(address);
+                let axis = drive.and_then(|drive| Axis::new(ring, drive));
                 all.extend(axis.map(|axis| (axis, touched)));
             }
         }

@@ -105,11 +105,11 @@ impl SimulatedLink {
             if powered {
                 witness.end(now);
             }
-            let own = witness.complaint();
+            let complaint = witness.complaint();
             let first =
-                |own: &&Complaint| found.as_ref().is_none_or(|(_, other)| own.at < other.at);
-            if let Some(own) = own.filter(first) {
-                found = Some((drive, own.clone()));
+                |new: &&Complaint| found.as_ref().is_none_or(|(_, other)| new.at < other.at);
+            if let Some(complaint) = complaint.filter(first) {
+                found = Some((drive, complaint.clone()));
             }
         }
         found
@@ -119,11 +119,11 @@ impl SimulatedLink {
         for ring in 0..self.bench.rings().len() {
             let drives = 0..self.drives(ring);
             for drive in drives {
-                let own = self
+                let drive = self
                     .bench
                     .ring_mut(ring)
-                    .and_then(|own| own.drive_mut(drive));
-                own.into_iter().for_each(&mut work);
+                    .and_then(|ring| ring.drive_mut(drive));
+                drive.into_iter().for_each(&mut work);
             }
         }
     }
@@ -138,9 +138,9 @@ impl SimulatedLink {
     pub(crate) fn earliest_time_out(&self) -> Span {
         let rings = 0..self.bench.rings().len();
         let drives = rings.flat_map(|ring| (0..self.drives(ring)).map(move |drive| (ring, drive)));
-        let own = drives.filter_map(|(ring, drive)| self.drive(ring, drive));
-        let own = own.map(|drive| drive.bus_end().properties().time_out);
-        own.min().unwrap_or(Span::MAX)
+        let drives = drives.filter_map(|(ring, drive)| self.drive(ring, drive));
+        let time_outs = drives.map(|drive| drive.bus_end().properties().time_out);
+        time_outs.min().unwrap_or(Span::MAX)
     }
 
     /// Listens on a link from now on, counted from the master's outgoing one: [`Self::fetch`] gives what arrives there.
@@ -172,8 +172,8 @@ impl SimulatedLink {
 
     /// What a [tapped](Self::tap) link has carried since the last call, with times of the conversation.
     pub(crate) fn take_record(&mut self, ring: usize, link: usize) -> Vec<LineByte> {
-        let own = self.bench.ring_mut(ring);
-        let mut record = own.map_or_else(Vec::new, |own| own.take_record(link));
+        let ring = self.bench.ring_mut(ring);
+        let mut record = ring.map_or_else(Vec::new, |ring| ring.take_record(link));
         for byte in &mut record {
             byte.at = self.since_origin(byte.at);
         }
@@ -191,8 +191,8 @@ impl SimulatedLink {
 
     /// What the drives of a ring have remarked since the last call, with times of the conversation.
     pub(crate) fn take_remarks(&mut self, ring: usize) -> Vec<Remark> {
-        let own = self.bench.ring_mut(ring);
-        let mut remarks = own.map_or_else(Vec::new, Ring::take_remarks);
+        let ring = self.bench.ring_mut(ring);
+        let mut remarks = ring.map_or_else(Vec::new, Ring::take_remarks);
         for remark in &mut remarks {
             remark.at = self.since_origin(remark.at);
         }
@@ -224,9 +224,9 @@ impl SimulatedLink {
     /// The next byte that the master has received from a ring, its time, and whether it goes back to a byte that the master sent. A byte
     /// that a drive sent unasked after a time-out (ND21 9.9) does not.
     pub(crate) fn receive_with_cause(&mut self, ring: usize) -> Option<(Instant, Received, bool)> {
-        let own = self.bench.ring_mut(ring)?;
+        let ring = self.bench.ring_mut(ring)?;
         loop {
-            let byte = own.receive()?;
+            let byte = ring.receive()?;
             if let Some(received) = byte.arrival() {
                 return Some((self.since_origin(byte.at), received, byte.solicited));
             }

@@ -101,9 +101,9 @@ mod tests {
     /// The figure of 9.8: drive 97 takes the master's zeros for those of a drive in the error mode, and 62 comes in place of 61.
     #[test]
     fn zeros_of_a_check_sequence() {
-        let ring = |own: usize, wrong: usize| {
-            let (own, more) = ("61 ".repeat(own), "62 ".repeat(wrong));
-            let text = format!("88 {}{own}{more}", "00 ".repeat(19));
+        let ring = |right: usize, wrong: usize| {
+            let (right, more) = ("61 ".repeat(right), "62 ".repeat(wrong));
+            let text = format!("88 {}{right}{more}", "00 ".repeat(19));
             located(text.trim_end(), 100).map(|location| (location.drive, location.sure))
         };
         assert_eq!(ring(3, 0), None);

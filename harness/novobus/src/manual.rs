@@ -22,11 +22,11 @@ fn open() -> Vec<Open> {
         values: property.values.join(" or "),
         about: property.about,
     });
-    let own = nd21::PROPERTIES.iter().map(|property| Open {
+    let drive = nd21::PROPERTIES.iter().map(|property| Open {
         section: property.section,
         name: property.name,
         values: property.values(),
         about: property.about,
     });
-    bus.chain(own).collect()
+    bus.chain(drive).collect()
 }

@@ -51,13 +51,13 @@ impl SentBytes<'_> {
             } => self.of_cell(index, drive, address),
             Role::Command { .. } | Role::Check { .. } if self.is_cut(index) => "9.5",
             Role::Check { drive, length, .. } if refused => {
-                let own =
+                let in_command =
                     |role: &&Role| matches!(role, Role::Command { .. }) && role.drive() == drive;
                 let mut command = self.roles[..index]
                     .iter()
                     .rev()
                     .take(length.into())
-                    .filter(own);
+                    .filter(in_command);
                 command.next().map_or("9.6", |role| role.rule().0)
             }
             _ => role.rule().0,
@@ -144,16 +144,16 @@ impl SentBytes<'_> {
         for at in (0..index).rev() {
             match self.roles[at] {
                 Role::Data {
-                    drive: Some(own),
+                    drive: Some(of),
                     address: read,
-                } if (own, read) == (drive, address) => {
+                } if (of, read) == (drive, address) => {
                     was_right = true;
                 }
                 Role::Check {
-                    drive: Some(own),
+                    drive: Some(of),
                     writes,
                     length,
-                } if own == drive => {
+                } if of == drive => {
                     let section = match at.checked_sub(1).map(|before| self.roles[before]) {
                         Some(Role::Command { section, .. }) => section,
                         _ => "10.1",
@@ -173,7 +173,7 @@ impl SentBytes<'_> {
                         _ => {}
                     }
                 }
-                Role::ProcessData { drive: Some(own) } if own == drive && address >= 0xFF00 => {
+                Role::ProcessData { drive: Some(of) } if of == drive && address >= 0xFF00 => {
                     return "9.4";
                 }
                 _ => {}
@@ -184,11 +184,11 @@ impl SentBytes<'_> {
 
     /// Whether the checking byte of a command is right.
     fn is_right(self, check: usize, drive: u8, length: u8) -> bool {
-        let own = |at: &usize| {
+        let in_command = |at: &usize| {
             matches!(self.roles[*at], Role::Command { .. } | Role::Data { .. })
                 && self.roles[*at].drive() == Some(drive)
         };
-        let command = (0..check).rev().filter(own);
+        let command = (0..check).rev().filter(in_command);
         let command = command.take(usize::from(length).saturating_sub(1));
         let sum = command.fold(Checksum::EMPTY, |sum, at| sum.with(self.bytes[at].0));
         sum.plus() == self.bytes[check].0

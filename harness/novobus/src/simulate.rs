@@ -55,11 +55,11 @@ pub(crate) fn warm(plan: &Plan) -> SimulatedLink {
 /// Drive `k`: the EEPROM first, since RAM is filled from it at power-up, then the cells.
 fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     let mut properties = Properties::default();
-    let mut own = Nd21Properties::default();
+    let mut choices = Nd21Properties::default();
     let model = plan.model(ring, k);
     for setup in plan.setups_of(ring, k) {
         setup.apply_to(&mut properties);
-        setup.apply_to_nd21(&mut own);
+        setup.apply_to_nd21(&mut choices);
     }
     let mut eeprom = model.eeprom();
     let parity = usize::from(ee::PARITY);
@@ -85,7 +85,7 @@ fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
         .collect();
     let mut drive = match model {
         Model::Plain => Drive::Plain(PlainDrive::new(properties, eeprom)),
-        Model::Nd21 => Drive::Nd21(Nd21Drive::new(properties, own, eeprom)),
+        Model::Nd21 => Drive::Nd21(Nd21Drive::new(properties, choices, eeprom)),
     };
     if !deviations.is_empty() {
         drive = Drive::Deviant(Box::new(Deviant::new(drive, deviations)));

@@ -129,9 +129,9 @@ impl StreamLink {
 
     /// Where a fault on a link of a ring is put; `None` where the bench has no port.
     fn spot(&self, ring: usize, link: usize) -> Option<Spot> {
-        let mut inner = self.pump.inner.iter();
-        let here = |own: &InnerLink| own.passes() && (own.ring, own.place) == (ring, link);
-        if let Some(place) = inner.position(here) {
+        let mut links = self.pump.inner.iter();
+        let here = |inner: &InnerLink| inner.passes() && (inner.ring, inner.place) == (ring, link);
+        if let Some(place) = links.position(here) {
             return Some(Spot::Inner(place));
         }
         let drives = self.pump.ports.get(ring)?.accounting.drives;
@@ -206,8 +206,8 @@ impl PortLink for StreamLink {
     }
 
     fn port_name(&self, port: usize) -> &str {
-        let own = self.pump.ports.get(port);
-        own.map_or("the port", |own| own.wire.name())
+        let port = self.pump.ports.get(port);
+        port.map_or("the port", |port| port.wire.name())
     }
 
     fn inner_links(&self) -> &[InnerLink] {
@@ -242,13 +242,13 @@ impl Link for StreamLink {
     }
 
     fn damages_parity(&self, ring: usize, link: usize) -> bool {
-        let mut inner = self.pump.inner.iter();
-        !inner.any(|own| (own.ring, own.place) == (ring, link) && own.shares_parity())
+        let mut links = self.pump.inner.iter();
+        !links.any(|inner| (inner.ring, inner.place) == (ring, link) && inner.shares_parity())
     }
 
     fn listens(&self, ring: usize, link: usize) -> bool {
-        let mut inner = self.pump.inner.iter();
-        inner.any(|own| (own.ring, own.place) == (ring, link)) || self.reaches(ring, link)
+        let mut links = self.pump.inner.iter();
+        links.any(|inner| (inner.ring, inner.place) == (ring, link)) || self.reaches(ring, link)
     }
 
     fn time_tolerance(&self) -> Span {

@@ -176,7 +176,7 @@ fn a_wrong_parity_bit_waits_for_a_silent_line() {
         port.pause(now, byte, tolerance);
         let at = port.free.max(now);
         port.send(now, 0xFE, byte);
-        assert_eq!(port.queue.back().map(|own| own.0), Some(at));
+        assert_eq!(port.queue.back().map(|queued| queued.0), Some(at));
         assert_eq!(port.free, at + byte, "what comes behind it is later too");
         at.since(Instant::START + byte * before as u64)
     };

@@ -77,7 +77,7 @@ impl RingReading {
     /// The lines above the table.
     #[must_use]
     pub(crate) fn lines(&self) -> Vec<HeadLine> {
-        let own = &self.counters;
+        let counters = &self.counters;
         vec![
             HeadLine::plain(format!(
                 "  {} bytes/s, {} telegrams/s, {} commands/s; the line is {}.{} % busy",
@@ -90,9 +90,9 @@ impl RingReading {
             HeadLine {
                 text: format!(
                     "  line errors {}, disturbed {}, corrected {}, commands repeated {}",
-                    own.line_errors, own.disturbed, own.corrected, own.repeated
+                    counters.line_errors, counters.disturbed, counters.corrected, counters.repeated
                 ),
-                is_error: own.line_errors > 0 || own.disturbed > 0,
+                is_error: counters.line_errors > 0 || counters.disturbed > 0,
             },
         ]
     }

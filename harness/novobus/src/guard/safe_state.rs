@@ -108,17 +108,17 @@ fn ring_to_safe_state(
 ) -> Vec<NotSafe> {
     let mut late = Span::ZERO;
     for turn in 1.. {
-        let mut own = OneRing::new(line, ring);
-        let mut not_safe = once(&mut own, size, standing);
-        let here = own.still.get().total();
+        let mut one_ring = OneRing::new(line, ring);
+        let mut not_safe = once(&mut one_ring, size, standing);
+        let here = one_ring.still.get().total();
         late = late + here;
         let again = here > Span::ZERO && turn < TURNS && line.trouble().is_none();
         if not_safe.is_empty() || !again {
-            for own in &mut not_safe {
-                own.axis = Axis::new(ring, own.axis.drive()).unwrap_or(own.axis);
+            for drive in &mut not_safe {
+                drive.axis = Axis::new(ring, drive.axis.drive()).unwrap_or(drive.axis);
                 if late > Span::ZERO {
                     let ms = late.as_nanos() / 1_000_000;
-                    own.why.push_str(&format!(
+                    drive.why.push_str(&format!(
                         "; the computer stood still for {ms} ms in {} at it",
                         counted(turn, "attempt")
                     ));

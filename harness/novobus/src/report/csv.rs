@@ -55,14 +55,14 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
                 index + 1
             );
             for byte in [byte.sent, byte.received] {
-                let _infallible = byte.map(|own| write!(row, "{own:02X}"));
+                let _infallible = byte.map(|byte| write!(row, "{byte:02X}"));
                 row.push(',');
             }
             for word in [status(byte), seen.meaning.role.name()] {
                 row.push_str(word);
                 row.push(',');
             }
-            let _infallible = drive.map(|own| write!(row, "{own}"));
+            let _infallible = drive.map(|drive| write!(row, "{drive}"));
             let words = words(&seen, byte);
             let mark = seen.mark.map_or_else(String::new, remark);
             for text in [&quoted(&words), seen.meaning.section(), &mark] {
@@ -100,13 +100,13 @@ pub(crate) fn remark(mark: &Remark) -> String {
         (Marks::RECOVERED, "recovered"),
     ];
     let mut text = String::new();
-    for (own, word) in WORDS {
-        if mark.marks().contains(own) {
+    for (flag, word) in WORDS {
+        if mark.marks().contains(flag) {
             if !text.is_empty() {
                 text.push(' ');
             }
             text.push_str(word);
-            if let Some(cause) = mark.cause().filter(|_| own == Marks::DETECTED) {
+            if let Some(cause) = mark.cause().filter(|_| flag == Marks::DETECTED) {
                 text.push(' ');
                 text.push_str(cause.name());
             }

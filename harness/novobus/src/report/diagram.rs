@@ -80,7 +80,7 @@ pub(crate) fn diagram(
 fn received(trace: &Trace, byte: usize) -> Option<[usize; 2]> {
     let link = trace.channels.iter().position(|link| link.to.is_none())?;
     let octets = trace.channels[link].octets().iter().enumerate();
-    let came = octets.filter(|(_, own)| own.received.is_some());
+    let came = octets.filter(|(_, byte)| byte.received.is_some());
     let (row, _) = came.take(byte).last()?;
     Some([link, row])
 }
@@ -90,18 +90,18 @@ const DAMAGED: usize = 20;
 
 /// What arrived damaged, with what was sent.
 fn damaged(html: &mut Html, ring: usize, trace: &Trace) {
-    let bad = |own: &LineByte| own.sent != own.received || own.error.is_some();
+    let bad = |byte: &LineByte| byte.sent != byte.received || byte.error.is_some();
     let of_link = |link: &'_ Channel| {
         let name = name(ring, link);
-        let octets = link.octets().iter().zip(1..).filter(move |own| bad(own.0));
-        let found = octets.map(move |(own, place)| (own.at, name.clone(), place, *own));
+        let bytes = link.octets().iter().zip(1..).filter(move |at| bad(at.0));
+        let found = bytes.map(move |(byte, place)| (byte.at, name.clone(), place, *byte));
         found.collect::<Vec<_>>()
     };
     let mut all: Vec<_> = trace.channels.iter().flat_map(of_link).collect();
     if all.is_empty() {
         return;
     }
-    all.sort_by_key(|own| own.0);
+    all.sort_by_key(|row| row.0);
     html.element("table", &[], |html| {
         html.line(
             "caption",
@@ -109,18 +109,18 @@ fn damaged(html: &mut Html, ring: usize, trace: &Trace) {
             "Damaged bytes: what was sent, and what arrived",
         );
         html.heads(&["Time", "Link", "Byte", "Sent", "Arrived"]);
-        for (at, link, place, own) in all.iter().take(DAMAGED) {
+        for (at, link, place, byte) in all.iter().take(DAMAGED) {
             let hex =
-                |byte: Option<u8>| byte.map_or("nothing".to_owned(), |own| format!("{own:02X}"));
-            let error = own
+                |byte: Option<u8>| byte.map_or("nothing".to_owned(), |byte| format!("{byte:02X}"));
+            let error = byte
                 .error
                 .map_or(String::new(), |error| format!(" ({error})"));
             html.element("tr", &[], |html| {
                 html.line("td", &[("class", &"n")], at);
                 html.line("td", &[("class", &"n")], link);
                 html.line("td", &[("class", &"n")], place);
-                html.line("td", &[("class", &"n")], hex(own.sent));
-                html.line("td", &[("class", &"n bad")], hex(own.received) + &error);
+                html.line("td", &[("class", &"n")], hex(byte.sent));
+                html.line("td", &[("class", &"n bad")], hex(byte.received) + &error);
             });
         }
     });

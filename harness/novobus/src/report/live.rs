@@ -83,9 +83,9 @@ impl LinkText {
         }
     }
 
-    fn byte(&mut self, nanos: u64, own: Received) -> Vec<LiveLine> {
+    fn byte(&mut self, nanos: u64, received: Received) -> Vec<LiveLine> {
         let mut lines = Vec::from_iter(self.idle(nanos));
-        let meaning = self.observer.see(Some(own.byte), own.error);
+        let meaning = self.observer.see(Some(received.byte), received.error);
         let kind = Kind::of(meaning.role);
         let begins = meaning.role == ByteRole::Sync
             || (kind != Kind::Any && kind != self.begun.kind)
@@ -101,13 +101,13 @@ impl LinkText {
             line.text.push(' ');
         }
         // Writing to a String cannot fail.
-        let _infallible = write!(line.text, "{:02X}", own.byte);
-        if let Some(error) = own.error {
+        let _infallible = write!(line.text, "{:02X}", received.byte);
+        if let Some(error) = received.error {
             let _infallible = write!(line.text, " ({error})");
         }
         line.bytes += 1;
         self.last = nanos;
-        if let Some((phrase, goes_on)) = phrase(&meaning, own.byte) {
+        if let Some((phrase, goes_on)) = phrase(&meaning, received.byte) {
             if goes_on
                 && line
                     .phrases
@@ -120,7 +120,7 @@ impl LinkText {
                 line.phrases.push(phrase);
             }
         }
-        if let Some(words) = self.located(meaning.role, own) {
+        if let Some(words) = self.located(meaning.role, received) {
             lines.extend(self.end());
             lines.push((nanos, words));
         }
@@ -138,13 +138,13 @@ impl LinkText {
     }
 
     /// The fault that the ring spells out, when it is known for sure, and at the latest when a check sequence begins.
-    fn located(&mut self, role: ByteRole, own: Received) -> Option<String> {
+    fn located(&mut self, role: ByteRole, received: Received) -> Option<String> {
         if self.to.is_some() {
             return None;
         }
         if role == ByteRole::CheckSequence {
             let before = self.heard.len().saturating_sub(FALSE);
-            let found = self.spelled(before).map(|own| own.drive);
+            let found = self.spelled(before).map(|location| location.drive);
             let said = found.and_then(|drive| self.name(drive));
             self.heard.clear();
             self.named = None;
@@ -153,7 +153,7 @@ impl LinkText {
         if self.heard.len() >= HEARD {
             self.heard.drain(..HEARD / 2);
         }
-        self.heard.push(own);
+        self.heard.push(received);
         let in_error = matches!(role, ByteRole::ErrorZero | ByteRole::ErrorAddress);
         let found = in_error.then(|| self.spelled(self.heard.len())).flatten()?;
         found.sure.then(|| self.name(found.drive)).flatten()
@@ -176,7 +176,7 @@ impl LinkText {
     fn located_in_silence(&mut self, now: u64) -> Option<LiveLine> {
         let found = self.spelled(self.heard.len())?;
         let before = self.spelled(self.heard.len().saturating_sub(FALSE));
-        let changed = before.is_some_and(|own| own.drive != found.drive);
+        let changed = before.is_some_and(|location| location.drive != found.drive);
         if changed && !found.sure {
             return None;
         }
@@ -187,8 +187,8 @@ impl LinkText {
 impl LiveText for LinkText {
     fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {
         match piece {
-            Piece::Octet(byte) => byte.arrival().map_or(Vec::new(), |own| {
-                self.byte(byte.at.since_start().as_nanos(), own)
+            Piece::Octet(byte) => byte.arrival().map_or(Vec::new(), |received| {
+                self.byte(byte.at.since_start().as_nanos(), received)
             }),
             _ => Vec::new(),
         }
@@ -225,10 +225,9 @@ fn phrase(meaning: &Meaning, byte: u8) -> Option<(String, bool)> {
     match meaning.role {
         ByteRole::Sync | ByteRole::Address => None,
         ByteRole::Parameter | ByteRole::Data => {
-            let (words, _) = words()
-                .rsplit_once(": ")
-                .map(|own| (own.0.to_owned(), ()))?;
-            Some((words, true))
+            let words = words();
+            let (words, _) = words.rsplit_once(": ")?;
+            Some((words.to_owned(), true))
         }
         ByteRole::Check if meaning.fits != Some(false) => None,
         _ => Some((words(), false)),
@@ -237,7 +236,7 @@ fn phrase(meaning: &Meaning, byte: u8) -> Option<(String, bool)> {
 
 /// Whether a phrase says the same of a command as another one, but not of which cell.
 fn is_part(shorter: &str, longer: &str) -> bool {
-    let command = |own: &str| own.split(" for drive").next().map(str::to_owned);
+    let command = |words: &str| words.split(" for drive").next().map(str::to_owned);
     match (command(shorter), command(longer)) {
         (Some(shorter), Some(longer)) => longer.starts_with(&shorter),
         _ => false,

@@ -131,7 +131,7 @@ impl Meaning {
         let to = self
             .drive
             .map_or_else(String::new, |drive| format!(" for drive {drive}"));
-        let name = self.command.map_or("a command", |own| own.printed_name);
+        let name = self.command.map_or("a command", |known| known.printed_name);
         let side = if self.answer { "answer to" } else { "" };
         let cell = self
             .cell

@@ -229,7 +229,7 @@ impl<'t> RingPicture<'t> {
         let all = 0..self.trace.channels.len();
         let faults = self.areas.iter().filter(|area| area.fault);
         let matters = faults.map(|area| area.links.start);
-        let matters = self.differs.map(|own| own[0]).into_iter().chain(matters);
+        let matters = self.differs.map(|at| at[0]).into_iter().chain(matters);
         // A fault on a link is of its sender or of the receiver, whose column is the next one.
         let matters = matters.flat_map(|place| [place, place + 1]);
         let ends = [0, all.end.saturating_sub(1)];
@@ -237,10 +237,10 @@ impl<'t> RingPicture<'t> {
         let mut placed: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
         let mut place_one = |place: usize, lines: &[usize]| {
             let x = LEFT + self.column * place + self.column / 2;
-            let room = |own: usize| if own == 0 { 22 } else { 10 };
+            let room = |column: usize| if column == 0 { 22 } else { 10 };
             let free = |y: &usize| {
-                let apart = |(other, own): (&usize, &(usize, usize))| {
-                    own.1 != *y || own.0.abs_diff(x) >= room(*other) + room(place)
+                let apart = |(other, taken): (&usize, &(usize, usize))| {
+                    taken.1 != *y || taken.0.abs_diff(x) >= room(*other) + room(place)
                 };
                 placed.iter().all(apart)
             };

@@ -125,7 +125,7 @@ impl SegmentReport for RingReport {
 fn damaging_cables(traces: &[Trace]) -> BTreeMap<String, usize> {
     let mut places = BTreeMap::new();
     for trace in traces {
-        let bad = |own: &&LineByte| own.sent != own.received || own.error.is_some();
+        let bad = |byte: &&LineByte| byte.sent != byte.received || byte.error.is_some();
         let mut seen = false;
         for link in &trace.channels {
             let count = link.octets().iter().filter(bad).count();
@@ -139,9 +139,9 @@ fn damaging_cables(traces: &[Trace]) -> BTreeMap<String, usize> {
             let arrived = link.octets().iter().filter_map(LineByte::arrival);
             arrived.collect::<Vec<_>>()
         });
-        if let Some(found) = heard.and_then(|own| locate(&own, trace.stations)) {
+        if let Some(found) = heard.and_then(|bytes| locate(&bytes, trace.stations)) {
             let before = found.drive.checked_add(1);
-            let before = before.filter(|own| *own < trace.stations);
+            let before = before.filter(|drive| *drive < trace.stations);
             *places.entry(cable(before, Some(found.drive))).or_default() += 1;
         }
     }

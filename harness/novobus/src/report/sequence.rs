@@ -249,7 +249,7 @@ fn asked(events: &mut [Event]) {
         .filter(sequence)
         .map(|event| event.at)
         .collect();
-    let period = |at: Instant| sequences.iter().filter(|own| **own < at).count();
+    let period = |at: Instant| sequences.iter().filter(|sequence| **sequence < at).count();
     let mut answers: BTreeMap<(Who, usize), Vec<usize>> = BTreeMap::new();
     for (index, event) in events.iter().enumerate() {
         if event.kind == Kind::Answer {
@@ -264,9 +264,9 @@ fn asked(events: &mut [Event]) {
             continue;
         }
         let key = (job.to, period(job.at));
-        let own = next.entry(key).or_default();
-        let answer = answers.get(&key).and_then(|all| all.get(*own));
-        *own += 1;
+        let number = next.entry(key).or_default();
+        let answer = answers.get(&key).and_then(|all| all.get(*number));
+        *number += 1;
         let answer = answer.map(|answer| &events[*answer]);
         let result = match answer.filter(|answer| answer.bytes.len() == job.bytes.len()) {
             Some(answer) if answer.result.is_empty() => "answered".to_owned(),
@@ -397,12 +397,12 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
     let x = |one: Who| {
         let place = who
             .iter()
-            .position(|own| *own == one)
+            .position(|other| *other == one)
             .unwrap_or(who.len() - 1);
         TIMES + COLUMN / 2 + COLUMN * place
     };
     let words_at = TIMES + COLUMN * who.len() + 10;
-    let letters = drawn.iter().map(|own| text(own).chars().count());
+    let letters = drawn.iter().map(|event| text(event).chars().count());
     let width = words_at + letters.max().unwrap_or(0) * LETTER + 10;
     let height = TOP + ROW * drawn.len() + 16;
     let words = "A line downwards for the master, for each drive that had a part, and for the ring; an arrow for each event. \

@@ -45,15 +45,15 @@ pub(crate) fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
     let pictures: Vec<_> = traces
         .iter()
         .enumerate()
-        .map(|own| RingPicture::new(own, placing, options.rows.clone(), most))
+        .map(|ring| RingPicture::new(ring, placing, options.rows.clone(), most))
         .collect();
     let mut legend: Vec<_> = pictures.iter().flat_map(RingPicture::legend).collect();
     legend.sort_unstable();
     legend.dedup();
 
-    let heights = pictures.iter().map(|own| own.size().1 + LINE);
+    let heights = pictures.iter().map(|picture| picture.size().1 + LINE);
     let rings: usize = heights.sum();
-    let widths = pictures.iter().map(|own| own.size().0);
+    let widths = pictures.iter().map(|picture| picture.size().0);
     let width = widths.max().unwrap_or(0).max(640);
     let height = HEAD + rings + LINE * legend.len() + 8;
 
@@ -79,17 +79,17 @@ pub(crate) fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
         words(html, "h", (12, 24), options.title);
         let mut y = HEAD;
         for picture in &pictures {
-            let own = picture.size().1;
+            let height = picture.size().1;
             let shift = format!("translate(0 {y})");
             html.element("g", &[("transform", &shift)], |html| {
                 picture.draw(html);
                 picture.titles(html);
                 if picture.cut {
                     let text = "The run goes on: only its beginning is drawn.";
-                    words(html, "cut", (LEFT, own + 8), text);
+                    words(html, "cut", (LEFT, height + 8), text);
                 }
             });
-            y += own + LINE;
+            y += height + LINE;
         }
         for (class, meaning) in &legend {
             key(html, *class, y);

@@ -192,7 +192,7 @@ fn arrived(byte: &LineByte) -> Cell {
 
 /// Marks as they are printed.
 pub(crate) fn signs(marks: Marks) -> String {
-    let signs = SIGNS.into_iter().filter(|(own, _)| marks.contains(*own));
+    let signs = SIGNS.into_iter().filter(|(mark, _)| marks.contains(*mark));
     signs.map(|(_, sign)| sign).collect()
 }
 

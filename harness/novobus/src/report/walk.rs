@@ -162,17 +162,18 @@ impl<'t> Reader<'t> {
 /// The marks of a link's sender, each with the byte of the link at which it stands: the answer to the byte that was
 /// remarked, or the next byte where none was sent (a time-out).
 fn placed<'t>(link: &Channel, marks: &'t [Remark]) -> Vec<(usize, &'t Remark)> {
-    let own: Vec<_> = marks
+    let of_sender: Vec<_> = marks
         .iter()
         .filter(|mark| link.from == Some(mark.station))
         .collect();
-    if own.is_empty() {
+    if of_sender.is_empty() {
         return Vec::new();
     }
     let sent: Vec<_> = (0..link.octets().len())
         .filter(|place| link.octets()[*place].sent.is_some())
         .collect();
-    own.into_iter()
+    of_sender
+        .into_iter()
         .filter_map(|mark| {
             let number = match mark.answered_as {
                 Some(number) => usize::try_from(number).ok()?.checked_sub(1)?,

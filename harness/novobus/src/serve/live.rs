@@ -79,7 +79,7 @@ impl Server {
             .flat_map(|(ring, drives)| (0..=usize::from(drives)).map(move |link| (ring, link)));
         let open = all
             .enumerate()
-            .filter(|(_, own)| self.is_open(own.0, own.1));
+            .filter(|(_, (ring, link))| self.is_open(*ring, *link));
         open.map(|(column, _)| column).collect()
     }
 
@@ -107,7 +107,7 @@ impl Server {
             range: SpeedRange::from_sw_version2(byte(ram::SW_VERSION2)),
             ..self.plan.units(ring, drive)
         };
-        let speed = cell("nist").and_then(|own| own.value(&word(ram::NIST), units)?.ok());
+        let speed = cell("nist").and_then(|cell| cell.value(&word(ram::NIST), units)?.ok());
         row.push(match speed {
             Some(Value::Exact(number)) => format!("{:.0}", number.to_f64()),
             Some(Value::Approximate(number)) => format!("{number:.0}"),
@@ -164,7 +164,7 @@ impl LiveView for Server {
             faults: FAULTS.map(|(_, words)| words).to_vec(),
             scripts: scripts(sizes.first().copied().unwrap_or(1))
                 .into_iter()
-                .map(|own| own.name)
+                .map(|script| script.name)
                 .collect(),
             read_only: None,
         }
@@ -193,8 +193,8 @@ impl LiveView for Server {
         let rows = recorder.rows(now);
         (news.rows, news.left_out, news.notes) = (rows.rows, rows.left_out, rows.notes);
         for row in news.rows.iter_mut().filter(|row| row.fold == 0) {
-            let cuts = open.iter().map(|own| LiveCell(*own, "//".to_owned(), 'c'));
-            row.cells.extend(cuts);
+            let cut = |column: &usize| LiveCell(*column, "//".to_owned(), 'c');
+            row.cells.extend(open.iter().map(cut));
         }
         let counts = recorder.counts().iter().zip(links(&sizes));
         news.traffic = counts

@@ -163,8 +163,8 @@ impl Recorder {
         *number += 1;
         let number = *number;
         let mut marks = Marks::NONE;
-        self.remarks.retain(|(own, remark)| {
-            let meant = *own == column
+        self.remarks.retain(|(place, remark)| {
+            let meant = *place == column
                 && match remark.answered_as {
                     Some(answer) => answer == number,
                     None => remark.at < byte.at,
@@ -222,20 +222,20 @@ impl Recorder {
         let rest = self.slots.split_off(&over);
         let slots = std::mem::replace(&mut self.slots, rest);
         let (mut busy, mut cells) = (0, 0);
-        let shown = slots.values().rev().take_while(|own| {
-            if !is_idle(own) {
+        let shown = slots.values().rev().take_while(|seen| {
+            if !is_idle(seen) {
                 busy += 1;
-                cells += own.len();
+                cells += seen.len();
             }
             busy <= MAX_ROWS && cells <= MAX_CELLS
         });
         let hidden = slots.len() - shown.count();
         let mut rows: Vec<LiveRow> = Vec::new();
-        for (slot, own) in slots.iter().skip(hidden) {
+        for (slot, seen) in slots.iter().skip(hidden) {
             let at = (Instant::START + self.byte * (slot + 1)).to_string();
             match rows.last_mut() {
-                Some(row) if is_idle(own) && row.fold > 0 => row.fold += 1,
-                _ if is_idle(own) => rows.push(LiveRow {
+                Some(row) if is_idle(seen) && row.fold > 0 => row.fold += 1,
+                _ if is_idle(seen) => rows.push(LiveRow {
                     at,
                     words: "SYNCO only".to_owned(),
                     fold: 1,
@@ -243,7 +243,7 @@ impl Recorder {
                 }),
                 _ => rows.push(LiveRow {
                     at,
-                    cells: own.iter().map(cell).collect(),
+                    cells: seen.iter().map(cell).collect(),
                     ..LiveRow::default()
                 }),
             }
@@ -304,9 +304,9 @@ fn note(ring: usize, drives: u8, location: Location) -> String {
 /// Whether links carried nothing but whole SYNCO.
 fn is_idle(cells: &[Seen]) -> bool {
     let mut cells = cells.iter();
-    cells.all(|own| {
-        let plain = own.byte.sent == Some(SYNCO) && !is_damaged(&own.byte);
-        plain && own.marks == Marks::NONE
+    cells.all(|seen| {
+        let plain = seen.byte.sent == Some(SYNCO) && !is_damaged(&seen.byte);
+        plain && seen.marks == Marks::NONE
     })
 }
 
@@ -315,10 +315,10 @@ fn is_damaged(byte: &LineByte) -> bool {
 }
 
 /// A byte as the picture shows it: its marks, what was sent, and what arrived where that differs.
-fn cell(own: &Seen) -> LiveCell {
-    let (column, byte) = (own.column, &own.byte);
+fn cell(seen: &Seen) -> LiveCell {
+    let (column, byte) = (seen.column, &seen.byte);
     let digits = |byte: Option<u8>| byte.map_or("--".to_owned(), |byte| format!("{byte:02X}"));
-    let sent = signs(own.marks) + &digits(byte.sent);
+    let sent = signs(seen.marks) + &digits(byte.sent);
     if is_damaged(byte) {
         let mark = if byte.error.is_some() { "~" } else { "" };
         let text = format!("{sent}\u{2192}{}{mark}", digits(byte.received));

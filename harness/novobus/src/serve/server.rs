@@ -185,7 +185,7 @@ impl Server {
     /// Whether a link is cut open.
     pub(super) fn is_open(&self, ring: usize, link: usize) -> bool {
         self.seats.iter().any(|seat| {
-            matches!(seat.at, At::Inner(own) if own.role != ClientRole::Tap && (own.ring, own.link) == (ring, link))
+            matches!(seat.at, At::Inner(inner) if inner.role != ClientRole::Tap && (inner.ring, inner.link) == (ring, link))
         })
     }
 
@@ -246,7 +246,7 @@ impl Server {
                 }
                 let record = self.link.take_record(ring, link);
                 let taps = self.seats.iter_mut().filter(|seat| {
-                    matches!(seat.at, At::Inner(own) if (own.ring, own.link) == (ring, link))
+                    matches!(seat.at, At::Inner(inner) if (inner.ring, inner.link) == (ring, link))
                 });
                 for seat in taps {
                     for read in record.iter().filter_map(LineByte::arrival) {

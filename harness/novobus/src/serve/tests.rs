@@ -445,13 +445,13 @@ fn a_page_shows_the_marks_of_the_print() {
     let column = |wanted: usize| {
         let cells = rows.iter().flat_map(|row| &row.cells);
         let of = cells
-            .filter(|own| own.0 == wanted)
-            .map(|own| own.1.as_str());
+            .filter(|cell| cell.0 == wanted)
+            .map(|cell| cell.1.as_str());
         of.collect::<Vec<_>>()
     };
     let marked = |column: &[&str]| {
-        let own = column.iter().filter(|text| text.len() > 2);
-        own.map(|text| (*text).to_owned()).collect::<Vec<_>>()
+        let marked = column.iter().filter(|text| text.len() > 2);
+        marked.map(|text| (*text).to_owned()).collect::<Vec<_>>()
     };
     assert_eq!(marked(&column(2)), ["!00", "#00"]);
     assert_eq!(marked(&column(3)), ["!00", "*00", "#00"]);
@@ -486,7 +486,7 @@ fn a_page_shows_where_a_ring_is_cut() {
     let rows = server.news().rows;
     assert!(!rows.is_empty());
     for row in rows {
-        let cut = row.cells.iter().filter(|own| own.0 == 1);
+        let cut = row.cells.iter().filter(|cell| cell.0 == 1);
         assert_eq!(
             cut.collect::<Vec<_>>(),
             [&LiveCell(1, "//".to_owned(), 'c')]
