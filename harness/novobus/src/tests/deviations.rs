@@ -329,8 +329,8 @@ fn drives_that_send_without_end_are_to_blame() {
             "{:#?}",
             played.outcome
         );
-        for trace in played.attempts.iter().flat_map(|own| &own.traces) {
-            let carried = trace.channels.iter().map(|own| own.octets().len());
+        for trace in played.attempts.iter().flat_map(|attempt| &attempt.traces) {
+            let carried = trace.channels.iter().map(|link| link.octets().len());
             assert!(carried.sum::<usize>() < 100_000, "{name}");
         }
     }
@@ -347,7 +347,7 @@ fn a_broken_sequence_is_tried_with_every_drive() {
     assert_eq!(plans.len(), 2);
     let judged = |setup: &str| -> Vec<Verdict> {
         let played = on_a_rig(setup, "", &plans);
-        played.iter().map(|own| own.outcome.verdict).collect()
+        played.iter().map(|play| play.outcome.verdict).collect()
     };
     assert_eq!(judged(""), [Verdict::Passed; 2]);
     for drive in 0..3 {

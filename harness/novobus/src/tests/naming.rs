@@ -76,7 +76,7 @@ fn twin(lines: &[String]) -> Result<Twin, ()> {
 fn plans() -> &'static [Plan] {
     static PLANS: OnceLock<Vec<Plan>> = OnceLock::new();
     PLANS.get_or_init(|| {
-        let own = conversations(DRIVES, &|place| place == 0).expect("no mistakes");
+        let conversations = conversations(DRIVES, &|place| place == 0).expect("no mistakes");
         let built_in = built_in_sources();
         let built_in = built_in.filter_map(|source| RingScenario::new(source, Some(DRIVES)).ok());
         let built_in = built_in.map(|entry| entry.plan);
@@ -94,9 +94,9 @@ fn plans() -> &'static [Plan] {
                     .is_ok_and(|outcome| outcome.took < SHORT)
         };
         let built_in = built_in.filter(fits);
-        let own = own.into_iter().map(|entry| entry.plan);
-        let own = own.filter(|plan| !asks_the_driver(plan));
-        own.chain(built_in).collect()
+        let conversations = conversations.into_iter().map(|entry| entry.plan);
+        let conversations = conversations.filter(|plan| !asks_the_driver(plan));
+        conversations.chain(built_in).collect()
     })
 }
 
@@ -169,7 +169,7 @@ impl Play {
         let (conversations, _) = as_they_are().compared(played, THROUGH_A_PORT);
         let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
         let mut found = comparisons.iter().enumerate();
-        let found = found.find(|(_, own)| own.divergence.is_some());
+        let found = found.find(|(_, comparison)| comparison.divergence.is_some());
         let sighting =
             found.and_then(|found| Sighting::of(&conversations, found, DRIVES, byte_time));
         let differs = found.is_some();
@@ -188,9 +188,9 @@ fn verdict(lines: &[String]) -> Verdict {
     let mut sightings = Vec::new();
     for (number, plan) in plans().iter().enumerate() {
         let (_, sighting) = play.play(&link, plan);
-        sightings.extend(sighting.map(|own| (number.to_string(), own)));
+        sightings.extend(sighting.map(|sighting| (number.to_string(), sighting)));
     }
-    let seen: Vec<_> = sightings.iter().map(|(_, own)| own.meant).collect();
+    let seen: Vec<_> = sightings.iter().map(|(_, seen)| seen.meant).collect();
     let asked = questions(DRIVES, &sightings);
     let pinned = asked.iter().filter_map(|question| {
         let plan = &question.entry.plan;
@@ -200,7 +200,7 @@ fn verdict(lines: &[String]) -> Verdict {
     let trials = exchange(DRIVES, sightings, &mut |entry: &RingScenario| {
         let plan = &entry.plan;
         let (differs, sighting) = play.play(&link, plan);
-        let meant = sighting.map_or(Meant::Nobody, |own| own.meant);
+        let meant = sighting.map_or(Meant::Nobody, |sighting| sighting.meant);
         Ok::<_, ()>(Some(differs.then_some(meant)))
     });
     let seen_all = RingSeen {
@@ -242,7 +242,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
         culprit,
         pinned,
     } = verdict(&lines);
-    let others = pinned.iter().find(|own| Some(own.drive) != whose);
+    let others = pinned.iter().find(|pinned| Some(pinned.drive) != whose);
     assert!(others.is_none(), "{lines:?}: {others:?}");
     if let Some(culprit) = culprit {
         assert_eq!(
@@ -251,13 +251,13 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
             "{lines:?}: another drive is blamed"
         );
     }
-    let accused = named.iter().filter_map(|own| match own.whose.clone() {
+    let accused = named.iter().filter_map(|named| match named.whose.clone() {
         Whose::OneOf(drives) if drives.len() == 1 => Some(drives[0]),
         _ => None,
     });
     let accused: Vec<_> = accused.collect();
     assert!(
-        accused.iter().all(|own| Some(*own) == whose),
+        accused.iter().all(|drive| Some(*drive) == whose),
         "{lines:?}: {named:?}"
     );
     let is_it = |named: &&Named| {
@@ -321,10 +321,10 @@ const STANDS: &str = "drive 0..last memory scope_status = 80";
 
 /// A scenario or a conversation of a qualification by its name.
 fn named_plan(name: &str) -> Plan {
-    let own = conversations(DRIVES, &|_| false).expect("no mistakes");
+    let conversations = conversations(DRIVES, &|_| false).expect("no mistakes");
     let built_in = built_in_sources();
     let built_in = built_in.filter_map(|source| RingScenario::new(source, Some(DRIVES)).ok());
-    let mut all = built_in.chain(own);
+    let mut all = built_in.chain(conversations);
     let entry = all.find(|entry| entry.short_name() == name).expect(name);
     entry.plan
 }
@@ -343,7 +343,7 @@ fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
         let plan = &question.entry.plan;
         question.answer(&played_in_time(plan, &link))
     });
-    pinned.map(|own| (own.drive, own.section)).collect()
+    pinned.map(|pin| (pin.drive, pin.section)).collect()
 }
 
 /// The deviations that explain what was played on a ring whose right drives have these lines.
@@ -357,7 +357,7 @@ fn names_of(play: &Play, lines: &[String]) -> Vec<&'static str> {
     };
     let twin = |header: &Header| twin(&[lines, &header.lines()].concat());
     let named = name(&seen, &twin);
-    named.iter().map(|own| own.deviation.name).collect()
+    named.iter().map(|named| named.deviation.name).collect()
 }
 
 /// A bit that is stuck at 0 is as in a drive that writes nothing, where nothing else is looked at; other cells that are right refute it.
@@ -466,10 +466,10 @@ fn a_ring_that_is_asked_shows_what_is_wrong() {
 /// breaks the rules of the error mode, and one that finds nothing those of the checking byte. Zeros behind a silence are those of 9.9.
 #[test]
 fn the_section_is_that_of_the_broken_rule() {
-    let (own, checksum) = (Meant::Own(1), "qualify-checksum-drive-1");
+    let (drive_1, checksum) = (Meant::Own(1), "qualify-checksum-drive-1");
     for (deviation, name, meant, section) in [
-        ("wrong-checksum-passed-on", checksum, own, "9.7"),
-        ("checksum-not-checked", checksum, own, "9.6"),
+        ("wrong-checksum-passed-on", checksum, drive_1, "9.7"),
+        ("checksum-not-checked", checksum, drive_1, "9.6"),
         ("time-out-always", "qualify-silences", Meant::Nobody, "9.9"),
     ] {
         let lines = [STANDS.to_owned(), format!("drive 1 deviates {deviation}")];
@@ -477,7 +477,7 @@ fn the_section_is_that_of_the_broken_rule() {
         let right = twin(&lines[..1]).expect("a ring");
         let all = played_in_time(&named_plan(name), &link);
         let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
-        let found = sighting.map(|own| (own.meant, own.section));
+        let found = sighting.map(|sighting| (sighting.meant, sighting.section));
         assert_eq!(found, Some((meant, section)), "{deviation}");
     }
 }
@@ -495,9 +495,9 @@ fn right_drives_have_no_names() {
 /// of all kinds behind them, tell the two apart.
 #[test]
 fn a_follower_that_adds_nothing_is_told_from_the_drive_behind_it() {
-    let own = verdict(&["drive 1 deviates adds-0-in-error-mode".to_owned()]);
-    let [only] = &own.named[..] else {
-        panic!("{own:?}")
+    let verdict = verdict(&["drive 1 deviates adds-0-in-error-mode".to_owned()]);
+    let [only] = &verdict.named[..] else {
+        panic!("{verdict:?}")
     };
     assert_eq!(only.deviation.name, "adds-0-in-error-mode");
     assert_eq!(only.whose, Whose::OneOf(vec![1]));
@@ -547,15 +547,15 @@ fn planted_in_every_drive(step: usize) {
         .filter(|deviation| !deviation.is_behind_the_bus());
     for planted in of_the_bus.step_by(step) {
         let lines = [format!("drive 0..last deviates {}", planted.name)];
-        let own = verdict(&lines);
+        let found = verdict(&lines);
         let of_all = |named: &Named| named.whose == Whose::Every || named.perhaps_of_all;
         assert!(
-            own.named.is_empty() || own.named.iter().any(of_all),
-            "{lines:?}: {own:?}"
+            found.named.is_empty() || found.named.iter().any(of_all),
+            "{lines:?}: {found:?}"
         );
         assert!(
-            own.culprit.is_none_or(|culprit| culprit.perhaps_of_all) || !own.named.is_empty(),
-            "{lines:?}: {own:?}"
+            found.culprit.is_none_or(|culprit| culprit.perhaps_of_all) || !found.named.is_empty(),
+            "{lines:?}: {found:?}"
         );
     }
 }
@@ -570,8 +570,8 @@ fn right_drives_with_contents_of_their_own_have_no_names() {
         "drive 0..last memory FF08 = 12 34",
         "drive 0..last memory FF7C = 56 78 9A BC",
     ];
-    let own = verdict(&lines.map(str::to_owned));
-    assert!(!own.differs && own.named.is_empty(), "{own:?}");
+    let found = verdict(&lines.map(str::to_owned));
+    assert!(!found.differs && found.named.is_empty(), "{found:?}");
 }
 
 /// ND21 9.9: the time-outs of the drives, and their waits, lie 0.3 ms apart at most. No drive is named, and what the probes of these times
@@ -582,20 +582,21 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
     let probes = probes(DRIVES).expect("no mistakes");
     for seed in 0..8_u64 {
         let tenths = |place: u64| (seed * 7 + place * 5) % 4;
-        let own = |place: u64, property: &str| {
+        let property_line = |place: u64, property: &str| {
             let drive = place % u64::from(DRIVES);
             let ms = tenths(place);
             format!("drive {drive} property {property} = 10.{ms}ms")
         };
         let lines: Vec<_> = (0..6)
-            .map(|place| own(place, time_outs[usize::from(place >= 3)]))
+            .map(|place| property_line(place, time_outs[usize::from(place >= 3)]))
             .collect();
-        let own = verdict(&lines);
-        assert!(!own.differs && own.named.is_empty(), "{lines:?}: {own:?}");
+        let found = verdict(&lines);
+        let nothing = !found.differs && found.named.is_empty();
+        assert!(nothing, "{lines:?}: {found:?}");
         let link = twin(&lines).expect("a ring").into_link();
         for probe in probes
             .iter()
-            .filter(|own| time_outs.contains(&own.property))
+            .filter(|probe| time_outs.contains(&probe.property))
         {
             let entries = probe.entries.iter().map(|entry| &entry.plan);
             let seen: Vec<_> = entries.map(|plan| played(plan, &link)).collect();
@@ -626,7 +627,7 @@ fn sighted_by(
     let all = played_in_time(&plan(&link), &link);
     let model = twin(&right).expect("a ring");
     let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
-    sighting.map(|own| (own.meant, own.section))
+    sighting.map(|sighting| (sighting.meant, sighting.section))
 }
 
 /// What these conversations are made for: ND21 10.1 (ROM is compared with itself, and longs go over the ends of pages), 14.4.1 and 14.10.1
@@ -641,7 +642,7 @@ fn conversations_find_their_deviations() {
     ] {
         assert_eq!(sighted(name, ""), None, "{name}");
         let found = sighted(name, &format!("drive 1 deviates {wrong}"));
-        assert_eq!(found.map(|own| own.0), Some(Meant::Own(1)), "{name}");
+        assert_eq!(found.map(|found| found.0), Some(Meant::Own(1)), "{name}");
     }
     // Which errors of the bus set the error bit is left open (11.8).
     let rule = "drive 1 property bus-errors = time-out-only";

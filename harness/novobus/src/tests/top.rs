@@ -130,7 +130,7 @@ fn hundred() -> Top {
         ..Snapshot::default()
     };
     for number in 0..100 {
-        let own = match number % 7 {
+        let shown = match number % 7 {
             0 => state(
                 status::ERROR,
                 flags::BLOCK,
@@ -144,7 +144,7 @@ fn hundred() -> Top {
         } else {
             50.0
         };
-        put(&mut reading, drive(0, number, own, speed));
+        put(&mut reading, drive(0, number, shown, speed));
     }
     let mut top = Top::new(heading(&["100 drives, tcp lab:4001, 38400 8O1"]));
     top.take(reading);

@@ -161,8 +161,9 @@ fn a_time_out_is_told_from_the_wait_behind_it() {
             let answered_not = "drive 0..last property time-out-answer = silent".to_owned();
             lines.extend(silent.then_some(answered_not));
             let probes = probes(3).expect("no mistakes");
-            let mut own = probes.iter().filter(|probe| probe.property == "time-out");
-            let found = answered(3, own.next().expect("a probe"), EXACT, &header(&lines));
+            let mut probes = probes.iter();
+            let probe = probes.find(|probe| probe.property == "time-out");
+            let found = answered(3, probe.expect("a probe"), EXACT, &header(&lines));
             // Silences of 12.5, 15.5 and 18.5 ms were tried: it is known between which, and exactly when the zeros came.
             let same = |ms: u64| [13, 16, 19].map(|gap| ms < gap);
             let found_is = |time_out: u64, wait: u64| {
@@ -199,9 +200,9 @@ fn a_long_ring_is_asked_for_its_time_outs() {
     ];
     let probes = probes(40).expect("no mistakes");
     for (property, value) in time_outs {
-        let own = probes.iter().find(|probe| probe.property == property);
+        let probe = probes.iter().find(|probe| probe.property == property);
         let own_header = header(&[format!("drive 0..last property {property} = {value}")]);
-        let answer = answered(40, own.expect("a probe"), EXACT, &own_header);
+        let answer = answered(40, probe.expect("a probe"), EXACT, &own_header);
         let is_it = matches!(&answer, Answer::Settled { header, .. } if *header == own_header);
         assert!(is_it, "{property} = {value}: {answer:?}");
     }
@@ -297,8 +298,8 @@ const READY: &str = "drive 0..last input GPIN3 GPIN5 high";
 /// What drive 1 of three answers to the probe for a property, where it is so and these lines stand in the header.
 fn asked(property: &str, value: &str, lines: &str) -> Answer {
     let probes = probes(3).expect("no mistakes").into_iter();
-    let mut own = probes.filter(|probe| probe.property == property);
-    let probe = own
+    let mut of_property = probes.filter(|probe| probe.property == property);
+    let probe = of_property
         .find(|probe| matches!(probe.asked, Asked::Drive(1, _)))
         .expect("a probe");
     let so = format!("drive 0..last property {property} = {value}");
@@ -472,7 +473,7 @@ fn bytes_that_are_still_coming_are_not_lost() {
         let (plan, link) = model(&[]);
         let mut twin = Twin::new(link, &plan.rings);
         let all: Vec<_> = seen.iter().map(|one| twin.follow(one, real)).collect();
-        let missing = |one: &crate::twin::Comparison| one.divergence.as_ref().map(|own| own.what);
+        let missing = |one: &crate::twin::Comparison| Some(one.divergence.as_ref()?.what);
         let late = all.iter().any(|one| one.untimely.is_some());
         (all.iter().find_map(missing), late)
     };
@@ -497,10 +498,10 @@ fn a_byte_is_late_where_the_bench_had_looked_for_it() {
             for (_, at, _) in &mut conversation.received {
                 *at = moved(*at);
             }
-            let ms = |own| Instant::START + Span::from_millis(own);
+            let at = |ms| Instant::START + Span::from_millis(ms);
             let unwatched = unwatched.iter();
-            conversation.unwatched = unwatched.map(|own| (ms(own.0), ms(own.1))).collect();
-            conversation.end = ms(200);
+            conversation.unwatched = unwatched.map(|&(from, to)| (at(from), at(to))).collect();
+            conversation.end = at(200);
         }
         let real = Exactness {
             tolerance: Span::from_millis(20),

@@ -111,7 +111,8 @@ fn shared_cases_have_the_evidence_of_cases_from_the_start() {
             let mut case = any(&mut random);
             if case.second.is_none() && random.bool() {
                 case.second = Some(any(&mut random).first);
-                two_links += usize::from(case.second.map(|own| own.link) != Some(case.first.link));
+                let second = case.second.map(|fault| fault.link);
+                two_links += usize::from(second != Some(case.first.link));
             }
             let again = format!(
                 "{name}: {}; repeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-novobus shared_cases",
@@ -158,9 +159,9 @@ fn counted_pairs_are_what_each_pair_is_from_the_start() {
         }
         for apart in [Apart::Byte, Apart::Link, Apart::Links] {
             for class in CaseClass::ALL {
-                let own = expected.get(&(apart, class)).copied().unwrap_or(0);
+                let count = expected.get(&(apart, class)).copied().unwrap_or(0);
                 assert_eq!(
-                    counted.counts[apart as usize][class as usize], own,
+                    counted.counts[apart as usize][class as usize], count,
                     "{apart:?} {class}"
                 );
             }
@@ -243,8 +244,8 @@ fn files_with_mistakes() {
     for text in texts {
         let problems = load(&text).expect_err(&text);
         for problem in problems.all() {
-            let own = problems.to_string().starts_with("a.toml");
-            let before = text.get(..problem.span.start).filter(|_| own);
+            let in_campaign = problems.to_string().starts_with("a.toml");
+            let before = text.get(..problem.span.start).filter(|_| in_campaign);
             let place = before.map_or("in its scenario".to_owned(), |before| {
                 let line = before.matches('\n').count() + 1;
                 let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;

@@ -46,8 +46,8 @@ fn both_rings_are_explored() {
     let (found, campaign) = explore(&RingSetup::default(), 4, 1_500);
     assert_eq!(found, []);
     let of = |ring: usize| {
-        let own = campaign.pool().cases().iter();
-        own.filter(|case| case.ring() == ring).count()
+        let cases = campaign.pool().cases().iter();
+        cases.filter(|case| case.ring() == ring).count()
     };
     let (first, second) = (of(0), of(1));
     assert!(first > 100 && second > 100, "{first} and {second}");

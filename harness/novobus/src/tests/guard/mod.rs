@@ -38,8 +38,8 @@ fn ring(drives: u64) -> Ring<Drive> {
         let mut eeprom = factory::eeprom();
         eeprom[0x23] = 0xFB;
         harness_sim::nd21::set_parity(&mut eeprom);
-        let own = Nd21Properties::default();
-        let mut drive = Nd21Drive::new(Properties::default(), own, eeprom);
+        let choices = Nd21Properties::default();
+        let mut drive = Nd21Drive::new(Properties::default(), choices, eeprom);
         drive.stimulate(Stimulus::Input(Input::Gpin3, true));
         drive.stimulate(Stimulus::Input(Input::Gpin5, true));
         Drive::Nd21(drive)

@@ -213,7 +213,7 @@ fn generated_scenarios_come_back() {
     runner
         .run(&lines, |(headers, steps)| {
             // Lines that cannot be read are left out, so that most scenarios can.
-            let alone = |own: &String| read(&format!("ring 3, 2\n{own}\n> 80\n")).is_ok();
+            let alone = |line: &String| read(&format!("ring 3, 2\n{line}\n> 80\n")).is_ok();
             let headers = headers
                 .iter()
                 .map(|picks| line(HEADERS, picks))

@@ -46,7 +46,7 @@ type Seen = (Option<u8>, Option<u8>, Option<LineError>);
 /// A ring of four that is served; it ends with this value.
 struct Served {
     /// The ring, then the inner links.
-    own: ServedRings,
+    rings: ServedRings,
     marks: bool,
 }
 
@@ -62,13 +62,13 @@ impl Served {
         });
         let setup = "drive 0..last model plain\n";
         Self {
-            own: ServedRings::start((setup, &[4]), transport, marks, roles.collect()),
+            rings: ServedRings::start((setup, &[4]), transport, marks, roles.collect()),
             marks,
         }
     }
 
     fn wire(&self, index: usize) -> Wire {
-        self.own.wire(index, self.marks)
+        self.rings.wire(index, self.marks)
     }
 
     fn link(&self, inner: Vec<InnerLink>) -> StreamLink {
@@ -186,15 +186,15 @@ const TRIES: usize = 4;
 fn plays_alike(link: &mut StreamLink, name: &str, faults: &[(u64, LinkFault)]) {
     let mut model = simulated();
     let expected = (play(&mut model, faults), column(&model, MIDDLE));
-    let mut own = (play(link, faults), column(link, MIDDLE));
+    let mut shown = (play(link, faults), column(link, MIDDLE));
     for _ in 1..TRIES {
-        if own == expected {
+        if shown == expected {
             break;
         }
         recover(link);
-        own = (play(link, faults), column(link, MIDDLE));
+        shown = (play(link, faults), column(link, MIDDLE));
     }
-    let (telegrams, on_link) = own;
+    let (telegrams, on_link) = shown;
     assert_eq!(telegrams, expected.0, "{name}: the telegrams, and SYNCO");
     assert_eq!(on_link, expected.1, "{name}: 2->1");
     assert_eq!(link.unused_faults(), [""; 0], "{name}");
@@ -276,15 +276,15 @@ fn tapped(transport: &str, marks: bool) {
         (played, taps.map(|(_, place)| arrived(link, place)))
     };
     let expected = shown(&mut simulated());
-    let mut own = shown(&mut link);
+    let mut seen = shown(&mut link);
     for _ in 1..TRIES {
-        if own == expected {
+        if seen == expected {
             break;
         }
         recover(&mut link);
-        own = shown(&mut link);
+        seen = shown(&mut link);
     }
-    assert_eq!(own, expected);
+    assert_eq!(seen, expected);
     for (_, place) in taps {
         let times = link.trace(0).channels[place].octets().to_vec();
         assert!(times.windows(2).all(|two| two[0].at <= two[1].at));

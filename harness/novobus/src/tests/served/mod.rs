@@ -33,7 +33,7 @@ impl ServedRings {
         };
         let mut server = Server::new(plan, link, Pace::Line, marks);
         let seats = sizes.len() + inner.len();
-        inner.into_iter().for_each(|own| server.add(own));
+        inner.into_iter().for_each(|link| server.add(link));
         let folder = tempfile::tempdir().expect("a folder");
         let places = (0..seats).map(|seat| match transport {
             "pty" => ServedAt::Pty(folder.path().join(format!("seat{seat}"))),

@@ -101,12 +101,12 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
     }
     harness_sim::nd21::set_parity(&mut eeprom);
     let ring = Ring::new(size(1), Rate::Baud38400, |_| {
-        let own = Nd21Properties {
+        let choices = Nd21Properties {
             s_ramp_wire: SRampWire::Puffer,
             eeprom_read_time: left.eeprom_read_time,
             ..Nd21Properties::default()
         };
-        let mut drive = Nd21Drive::new(Properties::default(), own, eeprom);
+        let mut drive = Nd21Drive::new(Properties::default(), choices, eeprom);
         drive.stimulate(Stimulus::Input(Input::Gpin3, true));
         drive.stimulate(Stimulus::Input(Input::Gpin5, true));
         drive.stimulate(Stimulus::Analogue(left.analogue));
@@ -354,14 +354,14 @@ fn a_read_that_is_under_way_changes_what_is_written() {
         (last, stored.expect("read"))
     };
     // As `bench` stores it.
-    let own = left.configuration[2] | 0x20;
-    let denied = (Some(true), own);
+    let stored = left.configuration[2] | 0x20;
+    let denied = (Some(true), stored);
     assert_eq!(attack(vec![], limits()), denied);
     let unlimited = attack(vec![], Limits::unlimited());
     assert_eq!(unlimited, (None, 0x40), "it is an attack");
     assert_eq!(attack(vec![poll.clone()], limits()), denied, "not read yet");
     let has_read = attack([wait(), vec![poll.clone()]].concat(), limits());
-    assert_eq!(has_read, (None, own));
+    assert_eq!(has_read, (None, stored));
     let again = [wait(), vec![[poll, read()].concat()]].concat();
     assert_eq!(attack(again, limits()), denied, "of the read before");
     let alike = telegram(&[0xC0, 0x8A, 0xFF]);
