@@ -16,15 +16,15 @@ fn dbc(drives: &str) -> String {
 
 fn message(dbc: &Dbc, id: u32) -> &Message {
     let all = dbc.messages().iter();
-    let mut own = all.filter(|message| message.id().raw() == id);
-    own.next().expect("a message")
+    let mut found = all.filter(|message| message.id().raw() == id);
+    found.next().expect("a message")
 }
 
 /// The signals of a register.
 fn signals(message: &Message, register: u8) -> Vec<&Signal> {
     let selected = MultiplexIndicator::MultiplexedSignal(register.into());
     let all = message.signals().iter();
-    all.filter(|own| *own.multiplexer_indicator() == selected)
+    all.filter(|signal| *signal.multiplexer_indicator() == selected)
         .collect()
 }
 
@@ -50,8 +50,8 @@ fn a_reader_sees_what_the_drive_sends() {
     let scaling = Scaling::default();
     let mut scaled = 0;
     for register in &REGISTERS {
-        let own = signals(tx, register.number);
-        assert!(!own.is_empty(), "{register:?}");
+        let found = signals(tx, register.number);
+        assert!(!found.is_empty(), "{register:?}");
         for raw in [0, 1, 0x1234, 0x7FFF, 0x8000, 0xFFFF, 0x8000_0000, u32::MAX] {
             let raw = raw & register.mask();
             let reply = Reply {
@@ -65,7 +65,7 @@ fn a_reader_sees_what_the_drive_sends() {
                 Unit::Status | Unit::Errors | Unit::Io | Unit::Mode
             );
             if of_bits || register.unit == Unit::Ramp {
-                for signal in &own {
+                for signal in &found {
                     let bit = signal.start_bit - 8;
                     let mask = (1_u64 << signal.size) - 1;
                     let expected = u64::from(raw) >> bit & mask;
@@ -73,8 +73,8 @@ fn a_reader_sees_what_the_drive_sends() {
                 }
                 continue;
             }
-            let [signal] = own.as_slice() else {
-                panic!("{register:?}: {own:?}");
+            let [signal] = found.as_slice() else {
+                panic!("{register:?}: {found:?}");
             };
             let count = counts(signal, frame.data());
             assert_eq!(count, register.number_of(raw), "{signal:?}");
@@ -105,21 +105,21 @@ fn a_writer_finds_what_it_may_write() {
         assert_eq!(*rx.size(), 5);
         for register in &REGISTERS {
             let written = matches!(register.access, Access::RW | Access::SP | Access::FN);
-            let own = signals(rx, register.number);
-            assert_eq!(!own.is_empty(), written, "{register:?}");
+            let found = signals(rx, register.number);
+            assert_eq!(!found.is_empty(), written, "{register:?}");
         }
         let request: Vec<_> = signals(rx, 0x3D);
         let request = request
             .iter()
-            .map(|own| (own.name().as_str(), own.start_bit));
+            .map(|signal| (signal.name().as_str(), signal.start_bit));
         assert_eq!(request.collect::<Vec<_>>(), [("READ", 8), ("INTERVAL", 16)]);
         let selectors = rx.signals().iter();
-        let selectors =
-            selectors.filter(|own| *own.multiplexer_indicator() == MultiplexIndicator::Multiplexor);
+        let selectors = selectors
+            .filter(|signal| *signal.multiplexer_indicator() == MultiplexIndicator::Multiplexor);
         assert_eq!(selectors.count(), 1);
     }
     assert_eq!(message(&file, 0x182).name(), "Drive2Tx");
     let known = Register::named("SPEED_ACTUAL").expect("a register");
-    let own = signals(message(&file, 0x182), known.number);
-    assert_eq!(own[0].name(), "SPEED_ACTUAL");
+    let found = signals(message(&file, 0x182), known.number);
+    assert_eq!(found[0].name(), "SPEED_ACTUAL");
 }

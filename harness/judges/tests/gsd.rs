@@ -44,7 +44,7 @@ fn the_gsd_says_what_the_drive_does() {
     let modules: Vec<_> = gsd
         .available_modules
         .iter()
-        .map(|own| own.config.as_slice())
+        .map(|module| module.config.as_slice())
         .collect();
     assert_eq!(modules, PpoType::ALL.map(PpoType::cfg));
     let longest = PpoType::ALL.map(PpoType::octets).into_iter().max();

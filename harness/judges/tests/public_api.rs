@@ -82,41 +82,44 @@ fn lines_of(name: &str, items: &[Item]) -> Vec<String> {
     let mut lines = Vec::new();
     let fields = |lines: &mut Vec<String>, owner: &str, fields: &Fields, all: bool| {
         for (index, field) in fields.iter().enumerate() {
-            let own = field
+            let name = field
                 .ident
                 .as_ref()
                 .map_or(index.to_string(), ToString::to_string);
             if all || is_public(&field.vis) {
-                lines.push(format!("{owner}.{own}: {}", text(&field.ty)));
+                lines.push(format!("{owner}.{name}: {}", text(&field.ty)));
             }
         }
     };
     for item in items {
         match item {
-            Item::Struct(own) if own.ident == name => {
+            Item::Struct(item) if item.ident == name => {
                 lines.push(format!("struct {name}"));
-                fields(&mut lines, name, &own.fields, false);
+                fields(&mut lines, name, &item.fields, false);
             }
-            Item::Enum(own) if own.ident == name => {
+            Item::Enum(item) if item.ident == name => {
                 lines.push(format!("enum {name}"));
-                for variant in &own.variants {
+                for variant in &item.variants {
                     let owner = format!("{name}::{}", variant.ident);
                     lines.push(owner.clone());
                     fields(&mut lines, &owner, &variant.fields, true);
                 }
             }
-            Item::Impl(own) if text(&own.self_ty).split('<').next() == Some(name) => {
-                if let Some((_, path, _)) = &own.trait_ {
+            Item::Impl(block) if text(&block.self_ty).split('<').next() == Some(name) => {
+                if let Some((_, path, _)) = &block.trait_ {
                     lines.push(format!("{name}: {}", text(path)));
                     continue;
                 }
-                for item in &own.items {
+                for item in &block.items {
                     match item {
-                        ImplItem::Fn(own) if is_public(&own.vis) && !is_hidden(&own.attrs) => {
-                            lines.push(signature(name, &own.sig));
+                        ImplItem::Fn(function)
+                            if is_public(&function.vis) && !is_hidden(&function.attrs) =>
+                        {
+                            lines.push(signature(name, &function.sig));
                         }
-                        ImplItem::Const(own) if is_public(&own.vis) => {
-                            lines.push(format!("{name}::{}: {}", own.ident, text(&own.ty)));
+                        ImplItem::Const(constant) if is_public(&constant.vis) => {
+                            let shown = text(&constant.ty);
+                            lines.push(format!("{name}::{}: {shown}", constant.ident));
                         }
                         _ => {}
                     }
@@ -133,13 +136,13 @@ fn the_public_interface_is_the_list() {
     let mut exported = BTreeSet::new();
     for item in items("drivebench/src/lib.rs") {
         match &item {
-            Item::Use(own) if is_public(&own.vis) && !is_hidden(&own.attrs) => {
-                names(&own.tree, &mut exported)
+            Item::Use(item) if is_public(&item.vis) && !is_hidden(&item.attrs) => {
+                names(&item.tree, &mut exported)
             }
-            Item::Mod(own) => assert!(
-                !is_public(&own.vis) || is_hidden(&own.attrs),
+            Item::Mod(module) => assert!(
+                !is_public(&module.vis) || is_hidden(&module.attrs),
                 "the module {} is public: hide it, or list what is in it",
-                own.ident
+                module.ident
             ),
             _ => {}
         }

@@ -264,13 +264,13 @@ pub fn decode(bytes: &[u8; LENGTH], heard: &mut impl FnMut(Report)) {
         true => Id::extended(number),
         false => u16::try_from(number).ok().and_then(Id::base),
     };
-    let frame = id_of.and_then(|own| match id & REMOTE != 0 {
-        true => Frame::remote(own, len).ok(),
-        false => Frame::new(own, &bytes[DATA..DATA + len]).ok(),
+    let frame = id_of.and_then(|id_of| match id & REMOTE != 0 {
+        true => Frame::remote(id_of, len).ok(),
+        false => Frame::new(id_of, &bytes[DATA..DATA + len]).ok(),
     });
     frame
         .into_iter()
-        .for_each(|own| heard(Report::Heard(CanEvent::Frame(own))));
+        .for_each(|frame| heard(Report::Heard(CanEvent::Frame(frame))));
 }
 
 /// Passes on what the bits of an error frame's class report, and `data[1]` where it is known.
@@ -278,7 +278,7 @@ pub fn decode_error(bits: u32, message: Option<u8>, heard: &mut impl FnMut(Repor
     const ORDINARY: u32 =
         class::LOST_ARBITRATION | class::CONTROLLER | class::RESTARTED | class::COUNTERS;
     let from_controller = bits & class::CONTROLLER != 0;
-    let says = |mask| from_controller && message.is_some_and(|own| own & mask != 0);
+    let says = |mask| from_controller && message.is_some_and(|bits| bits & mask != 0);
     if says(controller::OVERFLOW) {
         heard(Report::Lost);
     }
@@ -301,7 +301,7 @@ mod tests {
 
     fn reports(bytes: &[u8; LENGTH]) -> Vec<Report> {
         let mut all = Vec::new();
-        decode(bytes, &mut |own| all.push(own));
+        decode(bytes, &mut |report| all.push(report));
         all
     }
 
@@ -322,7 +322,7 @@ mod tests {
     /// `linux/can/error.h`: what is ordinary, what is lost, and what is an error on the bus.
     #[test]
     fn an_error_frame_is_what_its_bits_say() {
-        let error = |own| Report::Heard(CanEvent::Error(own));
+        let error = |error| Report::Heard(CanEvent::Error(error));
         let [wrong, off] = [CanError::ErrorFrame, CanError::BusOff].map(error);
         for (bits, message, expected) in [
             (0x002, 0x00, &[Report::Message][..]),
@@ -347,7 +347,7 @@ mod tests {
         // Where the data is not known, as with socketcand.
         let mut all = Vec::new();
         for bits in [0x002, 0x004, 0x104, 0x00C] {
-            decode_error(bits, None, &mut |own| all.push(own));
+            decode_error(bits, None, &mut |report| all.push(report));
         }
         let doubt = Report::MayBeLost;
         assert_eq!(all, [Report::Message, doubt, doubt, wrong]);

@@ -65,7 +65,7 @@ impl State {
         if short(message, 4)? != NEW_LINK {
             return None;
         }
-        let mut own = Self {
+        let mut state = Self {
             is_can: short(info, 2)? == CAN,
             index: number(info, 4)?,
             up: number(info, 8)? & UP != 0,
@@ -73,16 +73,16 @@ impl State {
         };
         let link = attribute(message.get(HEADER + INFO..end)?, LINK_INFO);
         let data = link.and_then(|link| attribute(link, INFO_DATA));
-        if let Some(data) = data.filter(|_| own.is_can) {
-            let value = |kind, at| attribute(data, kind).and_then(|own| number(own, at));
-            own.has_controller = value(STATE, 0).is_some();
-            own.rate = value(BIT_TIMING, 0).filter(|bits| *bits > 0);
-            own.bus_off = value(STATE, 0) == Some(BUS_OFF);
+        if let Some(data) = data.filter(|_| state.is_can) {
+            let value = |kind, at| attribute(data, kind).and_then(|data| number(data, at));
+            state.has_controller = value(STATE, 0).is_some();
+            state.rate = value(BIT_TIMING, 0).filter(|bits| *bits > 0);
+            state.bus_off = value(STATE, 0) == Some(BUS_OFF);
             // The modes that can be set stand in front of those that are.
-            own.listen_only = value(MODE, 4).is_some_and(|modes| modes & LISTEN_ONLY != 0);
-            own.restarts = value(RESTART, 0).is_some_and(|millis| millis > 0);
+            state.listen_only = value(MODE, 4).is_some_and(|modes| modes & LISTEN_ONLY != 0);
+            state.restarts = value(RESTART, 0).is_some_and(|millis| millis > 0);
         }
-        Some(own)
+        Some(state)
     }
 }
 
@@ -122,13 +122,13 @@ fn attribute(mut bytes: &[u8], kind: u16) -> Option<&[u8]> {
 }
 
 fn short(bytes: &[u8], at: usize) -> Option<u16> {
-    let own = bytes.get(at..at + 2)?;
-    Some(u16::from_ne_bytes(own.try_into().ok()?))
+    let two = bytes.get(at..at + 2)?;
+    Some(u16::from_ne_bytes(two.try_into().ok()?))
 }
 
 fn number(bytes: &[u8], at: usize) -> Option<u32> {
-    let own = bytes.get(at..at + 4)?;
-    Some(u32::from_ne_bytes(own.try_into().ok()?))
+    let four = bytes.get(at..at + 4)?;
+    Some(u32::from_ne_bytes(four.try_into().ok()?))
 }
 
 #[cfg(test)]
@@ -137,10 +137,10 @@ mod tests {
 
     fn with(kind: u16, value: &[u8]) -> Vec<u8> {
         let length = 4 + value.len();
-        let mut own = [length as u16, kind].map(u16::to_ne_bytes).concat();
-        own.extend(value);
-        own.resize(length.next_multiple_of(4), 0);
-        own
+        let mut attribute = [length as u16, kind].map(u16::to_ne_bytes).concat();
+        attribute.extend(value);
+        attribute.resize(length.next_multiple_of(4), 0);
+        attribute
     }
 
     fn answer(flags: u32, of: u16, data: &[u8]) -> Vec<u8> {
@@ -148,7 +148,7 @@ mod tests {
         let kind = with(1, b"can\0");
         let link = [kind, with(INFO_DATA, data)].concat();
         let info = [with(LINK_INFO | 0x8000, &link)].concat();
-        let mut own = [
+        let mut message = [
             0,
             u32::from(NEW_LINK),
             0,
@@ -160,14 +160,14 @@ mod tests {
         ]
         .map(u32::to_ne_bytes)
         .concat();
-        own.extend([name, info].concat());
-        let length = own.len() as u32;
-        own[..4].copy_from_slice(&length.to_ne_bytes());
-        own
+        message.extend([name, info].concat());
+        let length = message.len() as u32;
+        message[..4].copy_from_slice(&length.to_ne_bytes());
+        message
     }
 
     fn words(all: &[u32]) -> Vec<u8> {
-        all.iter().flat_map(|own| own.to_ne_bytes()).collect()
+        all.iter().flat_map(|word| word.to_ne_bytes()).collect()
     }
 
     #[test]
@@ -193,10 +193,10 @@ mod tests {
         assert_eq!(State::parse(&whole), Some(expected));
         // Modes that could be set, and are not.
         let data = with(MODE, &words(&[0xFF, 0]));
-        let own = State::parse(&answer(0, CAN, &data)).expect("an answer");
-        assert!(!own.listen_only && !own.up && !own.has_controller && own.rate.is_none());
+        let state = State::parse(&answer(0, CAN, &data)).expect("an answer");
+        assert!(!state.listen_only && !state.up && !state.has_controller && state.rate.is_none());
         // `lo`, and an error of the kernel.
-        assert!(State::parse(&answer(UP, 772, &[])).is_some_and(|own| !own.is_can));
+        assert!(State::parse(&answer(UP, 772, &[])).is_some_and(|state| !state.is_can));
         assert_eq!(State::parse(&words(&[36, 2, 0, 0, 19])), None);
         for cut in 0..whole.len() {
             let _no_panic = State::parse(&whole[..cut]);

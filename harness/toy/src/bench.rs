@@ -27,20 +27,21 @@ impl Bench {
     /// A bench with these valves; true for one that sticks.
     pub(crate) fn new(valves: &[(u8, bool)]) -> Self {
         let host = Participant::Host(Host::default());
-        let own = |&(number, sticks): &(u8, bool)| Participant::Drive(Valve::new(number, sticks));
-        let stations = std::iter::once(host).chain(valves.iter().map(own));
+        let station =
+            |&(number, sticks): &(u8, bool)| Participant::Drive(Valve::new(number, sticks));
+        let stations = std::iter::once(host).chain(valves.iter().map(station));
         Self {
             segment: Segment::new(RATE, stations.collect()),
-            valves: valves.iter().map(|own| own.0).collect(),
+            valves: valves.iter().map(|valve| valve.0).collect(),
             clock: BenchClock::default(),
         }
     }
 
     /// How far a valve is open, beside the bus.
     pub(crate) fn place(&self, valve: u8) -> Option<u8> {
-        let place = self.valves.iter().position(|own| *own == valve)?;
+        let place = self.valves.iter().position(|known| *known == valve)?;
         let station = self.segment.station(place + 1);
-        station.drive().map(|own| own.place)
+        station.drive().map(|drive| drive.place)
     }
 
     fn host(&mut self) -> Option<&mut Host> {
@@ -111,8 +112,8 @@ impl Link for Bench {
     }
 
     fn busy(&self) -> bool {
-        let own = self.segment.station(BENCH).host();
-        let sends = own.is_some_and(|host| host.waiting() > 0);
+        let host = self.segment.station(BENCH).host();
+        let sends = host.is_some_and(|host| host.waiting() > 0);
         let hears = self.heard_at().is_some_and(|at| at > self.clock.now);
         let mut valves = (1..=self.valves.len()).filter_map(|k| self.segment.station(k).drive());
         sends || hears || valves.any(|valve| valve.wants().is_some())
@@ -137,12 +138,12 @@ impl Link for Bench {
     }
 
     fn trace(&self, port: usize) -> Trace {
-        let sender = |own: &LineFrame| LineFrame {
-            from: own
+        let sender = |frame: &LineFrame| LineFrame {
+            from: frame
                 .from
                 .and_then(|place| self.valves.get(usize::from(place).checked_sub(1)?))
                 .copied(),
-            ..*own
+            ..*frame
         };
         let frames = self.segment.record().iter().map(sender).collect();
         let mut trace = Trace {

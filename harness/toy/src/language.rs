@@ -1,7 +1,7 @@
 //! The words of the bus: header lines, messages and steps, as read, settled, played and written.
 
 use crate::bench::Bench;
-use crate::valve::Said;
+use crate::valve::Telegram;
 use harness_bench::bus_name::BusName;
 use harness_bench::link::{Capability, Link};
 use harness_bench::medium::Out;
@@ -31,7 +31,7 @@ pub(crate) struct Message {
 
 /// A step of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Own {
+pub(crate) enum ValveStep {
     /// `open 1 = 50`: moves a valve, and waits for its answer.
     Open(u8, u8),
     /// `? valve 1 at 50`: looks at it beside the bus.
@@ -40,14 +40,14 @@ pub(crate) enum Own {
 
 /// An identifier and bytes.
 #[derive(Clone, Debug)]
-pub(crate) struct Wanted(u16, Vec<Expected>);
+pub(crate) struct ExpectedFrame(u16, Vec<Expected>);
 
 /// A decimal number of at most `most`.
 fn number(scanner: &mut Scanner<'_>, most: u8, what: &str) -> Result<u8, Problem> {
     let before = scanner.clone();
     let digits = scanner.take_while(|c| c.is_ascii_digit());
     let number = digits.and_then(|digits| digits.value.parse().ok());
-    number.filter(|own| *own <= most).ok_or_else(|| {
+    number.filter(|number| *number <= most).ok_or_else(|| {
         *scanner = before;
         scanner.unexpected(what)
     })
@@ -89,18 +89,18 @@ impl Settle<Valves> for Planner {
         Ok(vec![frame(message.id, &data, message.data.span)?])
     }
 
-    fn receive(&self, _: usize, message: &Message) -> Result<Vec<Wanted>, Problem> {
+    fn receive(&self, _: usize, message: &Message) -> Result<Vec<ExpectedFrame>, Problem> {
         let data = message.data.expand(Scope::default(), 8)?;
-        Ok(vec![Wanted(message.id, data)])
+        Ok(vec![ExpectedFrame(message.id, data)])
     }
 
     fn act(
         &mut self,
-        own: &Own,
+        step: &ValveStep,
         span: TextSpan,
         needs: &mut Vec<Capability>,
-    ) -> Result<Own, Problem> {
-        let (Own::Open(valve, _) | Own::At(valve, _)) = *own;
+    ) -> Result<ValveStep, Problem> {
+        let (ValveStep::Open(valve, _) | ValveStep::At(valve, _)) = *step;
         if !self.0.iter().any(|(known, _)| *known == valve) {
             let message = format!("the bench has no valve {valve}");
             return Err(Problem::new(
@@ -109,18 +109,18 @@ impl Settle<Valves> for Planner {
                 "a valve of the header expected",
             ));
         }
-        needs.extend(matches!(own, Own::At(..)).then_some(Capability::Simulator));
-        Ok(*own)
+        needs.extend(matches!(step, ValveStep::At(..)).then_some(Capability::Simulator));
+        Ok(*step)
     }
 
-    fn pieces(own: &Own) -> (usize, usize) {
-        match own {
-            Own::Open(..) => (1, 1),
-            Own::At(..) => (0, 0),
+    fn pieces(step: &ValveStep) -> (usize, usize) {
+        match step {
+            ValveStep::Open(..) => (1, 1),
+            ValveStep::At(..) => (0, 0),
         }
     }
 
-    fn judges(_: &Own) -> bool {
+    fn judges(_: &ValveStep) -> bool {
         true
     }
 
@@ -144,11 +144,11 @@ impl Language for Valves {
 
     type Header = Vec<(u8, bool)>;
     type Message = Message;
-    type Step = Own;
+    type Step = ValveStep;
     type Setup = Vec<(u8, bool)>;
     type Sent = Frame;
-    type Wanted = Wanted;
-    type Act = Own;
+    type Wanted = ExpectedFrame;
+    type Act = ValveStep;
     type Received = Frame;
     type State = ();
     type Planner = Planner;
@@ -187,8 +187,8 @@ impl Language for Valves {
     fn message(scanner: &mut Scanner<'_>) -> Result<Message, Problem> {
         let before = scanner.clone();
         let digits = scanner.take_while(|c| c.is_ascii_hexdigit());
-        let digits = digits.filter(|own| own.value.len() == 3);
-        let id = digits.and_then(|own| u16::from_str_radix(own.value, 16).ok());
+        let digits = digits.filter(|digits| digits.value.len() == 3);
+        let id = digits.and_then(|digits| u16::from_str_radix(digits.value, 16).ok());
         let Some(id) = id else {
             *scanner = before;
             return Err(scanner.unexpected("an identifier of three hexadecimal digits"));
@@ -197,16 +197,16 @@ impl Language for Valves {
         Ok(Message { id, data })
     }
 
-    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<Own, Problem>> {
+    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<ValveStep, Problem>> {
         let look = |scanner: &mut Scanner<'_>| {
             let valve = valve(scanner)?;
             required(scanner, &["at"])?;
-            Ok(Own::At(valve, percent(scanner)?))
+            Ok(ValveStep::At(valve, percent(scanner)?))
         };
         let open = |scanner: &mut Scanner<'_>| {
             let valve = valve(scanner)?;
             equals(scanner)?;
-            Ok(Own::Open(valve, percent(scanner)?))
+            Ok(ValveStep::Open(valve, percent(scanner)?))
         };
         match opening {
             Opening::Check if scanner.eat_word("valve") => Some(look(scanner)),
@@ -245,24 +245,28 @@ impl Language for Valves {
         Ok(())
     }
 
-    fn act(runner: &mut Runner<'_, Self>, own: &Own, step: &PlannedStep<Self>) -> Result<(), Stop> {
-        match *own {
-            Own::Open(valve, place) => {
-                let (id, data) = Said::Move(valve, place).encode();
+    fn act(
+        runner: &mut Runner<'_, Self>,
+        action: &ValveStep,
+        step: &PlannedStep<Self>,
+    ) -> Result<(), Stop> {
+        match *action {
+            ValveStep::Open(valve, place) => {
+                let (id, data) = Telegram::Move(valve, place).encode();
                 let request = Frame::base(id, &data);
                 let request =
                     request.map_err(|error| Stop::failed(step.span, error.to_string()))?;
-                let (id, data) = Said::At(valve, place).encode();
-                let answer = Wanted(id, data.into_iter().map(Expected::Byte).collect());
+                let (id, data) = Telegram::At(valve, place).encode();
+                let answer = ExpectedFrame(id, data.into_iter().map(Expected::Byte).collect());
                 runner.transmit(0, &[request]);
                 runner.expect(step.span, 0, &[answer], None)
             }
-            Own::At(valve, place) => {
+            ValveStep::At(valve, place) => {
                 runner.settle();
                 let bench = runner
                     .link
                     .beside()
-                    .and_then(|own| own.downcast_ref::<Bench>());
+                    .and_then(|bench| bench.downcast_ref::<Bench>());
                 match bench.and_then(|bench| bench.place(valve)) {
                     Some(found) if found == place => Ok(()),
                     Some(found) => {
@@ -291,15 +295,15 @@ impl Language for Valves {
         }
     }
 
-    fn matches(Wanted(id, data): &Wanted, frame: Frame) -> bool {
+    fn matches(ExpectedFrame(id, data): &ExpectedFrame, frame: Frame) -> bool {
         let mut pairs = data.iter().zip(frame.data());
         frame.id().number() == u32::from(*id)
             && frame.data().len() == data.len()
-            && pairs.all(|(own, byte)| *own == Expected::Any || *own == Expected::Byte(*byte))
+            && pairs.all(|(known, byte)| [Expected::Any, Expected::Byte(*byte)].contains(known))
     }
 
-    fn describe(Wanted(id, data): &Wanted) -> String {
-        let bytes = data.iter().map(|own| format!(" {own}"));
+    fn describe(ExpectedFrame(id, data): &ExpectedFrame) -> String {
+        let bytes = data.iter().map(|byte| format!(" {byte}"));
         format!("{id:03X}{}", bytes.collect::<String>())
     }
 
@@ -319,10 +323,10 @@ impl Language for Valves {
         format!("{:03X} {}", message.id, message.data)
     }
 
-    fn write_step(own: &Own) -> String {
-        match own {
-            Own::Open(valve, place) => format!("open {valve} = {place}"),
-            Own::At(valve, place) => format!("? valve {valve} at {place}"),
+    fn write_step(step: &ValveStep) -> String {
+        match step {
+            ValveStep::Open(valve, place) => format!("open {valve} = {place}"),
+            ValveStep::At(valve, place) => format!("? valve {valve} at {place}"),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! How the bus is shown: its table. Pictures and files for tools have defaults.
 
-use crate::valve::Said;
+use crate::valve::Telegram;
 use harness_bench::capture::Piece;
 use harness_bench::capture::live::{LiveLine, LiveText};
 use harness_bench::shown::{SegmentReport, TablePart};
@@ -43,10 +43,10 @@ fn row(frame: &LineFrame) -> String {
 }
 
 fn meaning(frame: &LineFrame) -> String {
-    match Said::decode(&frame.frame) {
-        Some(Said::Ask(valve)) => format!("where is valve {valve}?"),
-        Some(Said::Move(valve, place)) => format!("valve {valve}: go to {place} %"),
-        Some(Said::At(valve, place)) => format!("valve {valve} is at {place} %"),
+    match Telegram::decode(&frame.frame) {
+        Some(Telegram::Ask(valve)) => format!("where is valve {valve}?"),
+        Some(Telegram::Move(valve, place)) => format!("valve {valve}: go to {place} %"),
+        Some(Telegram::At(valve, place)) => format!("valve {valve} is at {place} %"),
         None => format!("foreign: {}", frame.frame),
     }
 }

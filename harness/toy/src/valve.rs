@@ -17,7 +17,7 @@ const DELAY: Span = Span::from_micros(100);
 
 /// What a frame says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Said {
+pub(crate) enum Telegram {
     /// The bench asks where a valve stands.
     Ask(u8),
     /// The bench moves a valve to a percentage.
@@ -26,7 +26,7 @@ pub(crate) enum Said {
     At(u8, u8),
 }
 
-impl Said {
+impl Telegram {
     /// Reads a frame; `None` for one that says nothing on this bus.
     pub(crate) fn decode(frame: &Frame) -> Option<Self> {
         let number = u16::try_from(frame.id().number()).ok()?;
@@ -73,9 +73,9 @@ impl Valve {
 
 impl Station for Valve {
     fn hear(&mut self, at: Instant, frame: &Frame) {
-        match Said::decode(frame) {
-            Some(Said::Ask(own)) if own == self.number => {}
-            Some(Said::Move(own, place)) if own == self.number => {
+        match Telegram::decode(frame) {
+            Some(Telegram::Ask(number)) if number == self.number => {}
+            Some(Telegram::Move(number, place)) if number == self.number => {
                 if !self.sticks {
                     self.place = place;
                 }

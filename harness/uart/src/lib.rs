@@ -126,15 +126,15 @@ impl Counts {
 
 /// The counts of a port; `None` where its driver does not count.
 pub fn counts(port: impl AsFd) -> Option<Counts> {
-    let own: Icounter = get::<TIOCGICOUNT, _>(port.as_fd()).ok()?;
-    let count = |own: c_int| own.cast_unsigned();
+    let counted: Icounter = get::<TIOCGICOUNT, _>(port.as_fd()).ok()?;
+    let count = |number: c_int| number.cast_unsigned();
     Some(Counts {
-        sent: count(own.tx),
-        received: count(own.rx),
-        overruns: count(own.overrun).wrapping_add(count(own.buf_overrun)),
-        parity: count(own.parity),
-        framing: count(own.frame),
-        breaks: count(own.brk),
+        sent: count(counted.tx),
+        received: count(counted.rx),
+        overruns: count(counted.overrun).wrapping_add(count(counted.buf_overrun)),
+        parity: count(counted.parity),
+        framing: count(counted.frame),
+        breaks: count(counted.brk),
     })
 }
 
@@ -142,10 +142,11 @@ pub fn counts(port: impl AsFd) -> Option<Counts> {
 /// The driver for 8250 chips (16550) takes every rate, says that it has it, and makes the nearest whole fraction of its base rate.
 pub fn real_rate(port: impl AsFd, asked: u32) -> Option<u32> {
     let device = rustix::fs::fstat(&port).ok()?.st_rdev;
-    let own: SerialStruct = get::<TIOCGSERIAL, _>(port.as_fd()).ok()?;
-    let own = Some(own).filter(|_| rustix::fs::major(device) == TTY_MAJOR)?;
-    let base = u32::try_from(own.baud_base).ok().filter(|base| *base > 0)?;
-    DIVIDED.contains(&own.kind).then(|| divided(base, asked))
+    let driver: SerialStruct = get::<TIOCGSERIAL, _>(port.as_fd()).ok()?;
+    let driver = Some(driver).filter(|_| rustix::fs::major(device) == TTY_MAJOR)?;
+    let base = u32::try_from(driver.baud_base).ok();
+    let base = base.filter(|base| *base > 0)?;
+    DIVIDED.contains(&driver.kind).then(|| divided(base, asked))
 }
 
 /// The nearest whole fraction of a base rate.
@@ -162,24 +163,24 @@ pub struct LowLatency(OwnedFd);
 impl LowLatency {
     /// Asks the driver for it, which any user may; `None` where the driver does not have it or the port has it already.
     pub fn of(port: impl AsFd) -> Option<Self> {
-        let own: SerialStruct = get::<TIOCGSERIAL, _>(port.as_fd()).ok()?;
-        if own.flags & LOW_LATENCY != 0 {
+        let driver: SerialStruct = get::<TIOCGSERIAL, _>(port.as_fd()).ok()?;
+        if driver.flags & LOW_LATENCY != 0 {
             return None;
         }
         let kept = Self(port.as_fd().try_clone_to_owned().ok()?);
-        let flags = own.flags | LOW_LATENCY;
-        set(port.as_fd(), SerialStruct { flags, ..own }).ok()?;
+        let flags = driver.flags | LOW_LATENCY;
+        set(port.as_fd(), SerialStruct { flags, ..driver }).ok()?;
         Some(kept)
     }
 }
 
 impl Drop for LowLatency {
     fn drop(&mut self) {
-        let own: Result<SerialStruct, _> = get::<TIOCGSERIAL, _>(self.0.as_fd());
-        if let Ok(own) = own {
-            let flags = own.flags & !LOW_LATENCY;
+        let driver: Result<SerialStruct, _> = get::<TIOCGSERIAL, _>(self.0.as_fd());
+        if let Ok(driver) = driver {
+            let flags = driver.flags & !LOW_LATENCY;
             // A port that is gone has no settings any more.
-            let _gone = set(self.0.as_fd(), SerialStruct { flags, ..own });
+            let _gone = set(self.0.as_fd(), SerialStruct { flags, ..driver });
         }
     }
 }

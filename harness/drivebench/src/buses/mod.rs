@@ -139,7 +139,7 @@ pub(crate) fn drive(command: DriveCommand, output: &mut Output) -> std::io::Resu
     if let DriveCommand::Sim(arguments) = &command {
         return told(sim(arguments, output), output);
     }
-    let named = command.rig().and_then(|own| own.rig.as_ref());
+    let named = command.rig().and_then(|arguments| arguments.rig.as_ref());
     let rig = match named {
         Some(RigName::Named(name)) => match find_any_rig(name, output) {
             Some(rig) => Some(Rc::new(rig)),

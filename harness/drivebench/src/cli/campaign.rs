@@ -37,7 +37,7 @@ pub(crate) fn campaign(
         return pairs(&found, arguments, output);
     }
     let wholes = found.iter_mut();
-    let wholes = wholes.map(|own| WholeCampaign::of(&mut **own, arguments.partition));
+    let wholes = wholes.map(|campaign| WholeCampaign::of(&mut **campaign, arguments.partition));
     let wholes: Vec<_> = wholes.collect();
     let all = match play(&found, arguments, output)? {
         Ok(all) => all,
@@ -51,9 +51,9 @@ pub(crate) fn campaign(
     {
         return Ok(Exit::RigError);
     }
-    let differs = all.iter().any(|own| !own.differs().is_empty());
+    let differs = all.iter().any(|played| !played.differs().is_empty());
     let counts = wholes.into_iter().zip(&all);
-    let counts = counts.map(|(whole, own)| whole.counts(&**own)).collect();
+    let counts = counts.map(|(whole, run)| whole.counts(&**run)).collect();
     Ok(keep(counts, differs, arguments, output))
 }
 
@@ -70,7 +70,8 @@ fn keep(
     {
         return Exit::RigError;
     }
-    let nothing = counts.campaigns.iter().all(|own| own.played() == Some(0));
+    let mut campaigns = counts.campaigns.iter();
+    let nothing = campaigns.all(|campaign| campaign.played() == Some(0));
     match (&arguments.partition, differs) {
         (_, true) => Exit::Failed,
         (Some(part), false) if nothing => {
@@ -144,7 +145,8 @@ fn play(
             Err(defect) => return Ok(Err(defect)),
         };
         // A class that a campaign does not have leaves it out.
-        let only = arguments.only.map(|own| class_of(&*played, &own.name()));
+        let only = arguments.only.as_ref();
+        let only = only.map(|class| class_of(&*played, &class.name()));
         match (arguments.format, only) {
             (_, Some(None)) => {}
             (TableFormat::Table, None) => output.result(&(played.table() + "\n"))?,
@@ -287,7 +289,7 @@ impl ClassName {
     fn name(self) -> String {
         let value = self.to_possible_value();
         value
-            .map(|own| own.get_name().to_owned())
+            .map(|value| value.get_name().to_owned())
             .unwrap_or_default()
     }
 }

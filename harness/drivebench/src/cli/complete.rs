@@ -58,8 +58,9 @@ pub(crate) fn fitting(command: &Command, words: &[String]) -> Fitting {
             continue;
         }
         if let Some(option) = word.strip_prefix('-') {
-            let found = level.get_arguments().find(|own| is_named(own, option));
-            waiting = found.filter(|own| own.get_action().takes_values());
+            let mut arguments = level.get_arguments();
+            let found = arguments.find(|argument| is_named(argument, option));
+            waiting = found.filter(|argument| argument.get_action().takes_values());
         } else if let Some(inner) = level.find_subcommand(word) {
             (level, positionals) = (inner, 0);
         } else {
@@ -69,24 +70,25 @@ pub(crate) fn fitting(command: &Command, words: &[String]) -> Fitting {
     let mut fitting = if let Some(option) = waiting {
         values(option, current, rig(before))
     } else if current.starts_with('-') {
-        let options = level.get_arguments().filter(|own| !own.is_hide_set());
+        let options = level.get_arguments().filter(|option| !option.is_hide_set());
         Fitting {
             words: options
-                .filter_map(|own| own.get_long())
-                .map(|own| format!("--{own}"))
+                .filter_map(|argument| argument.get_long())
+                .map(|name| format!("--{name}"))
                 .collect(),
             files: false,
         }
     } else if level.has_subcommands() {
-        let inner = level.get_subcommands().filter(|own| !own.is_hide_set());
+        let inner = level.get_subcommands();
+        let inner = inner.filter(|command| !command.is_hide_set());
         Fitting {
-            words: inner.map(|own| own.get_name().to_owned()).collect(),
+            words: inner.map(|command| command.get_name().to_owned()).collect(),
             files: false,
         }
     } else {
         // The last positional may repeat.
         let positional = level.get_positionals().take(positionals + 1).last();
-        positional.map_or_else(Fitting::default, |own| values(own, current, rig(before)))
+        positional.map_or_else(Fitting::default, |last| values(last, current, rig(before)))
     };
     fitting
         .words
@@ -126,7 +128,7 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
     let fixed = argument.get_possible_values();
     if !fixed.is_empty() {
         return Fitting {
-            words: fixed.iter().map(|own| own.get_name().to_owned()).collect(),
+            words: fixed.iter().map(|fit| fit.get_name().to_owned()).collect(),
             files: false,
         };
     }
@@ -156,7 +158,7 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
             "DRIVE=NAME" => {
                 let drive = current.split_once('=').map_or("0", |(drive, _)| drive);
                 let [drives, _] = (BUSES[0].deviations)();
-                let names = drives.iter().map(|own| own.name);
+                let names = drives.iter().map(|deviation| deviation.name);
                 names.map(|name| format!("{drive}={name}")).collect()
             }
             _ => Vec::new(),
@@ -187,7 +189,7 @@ mod tests {
     #[track_caller]
     fn offers(line: &str, word: &str) {
         let fitting = of(line);
-        let has = fitting.words.iter().any(|own| own == word);
+        let has = fitting.words.iter().any(|fit| fit == word);
         assert!(has, "{line}: {fitting:?}");
     }
 
@@ -209,8 +211,8 @@ mod tests {
             Fitting {
                 words: command()
                     .get_subcommands()
-                    .filter(|own| !own.is_hide_set())
-                    .map(|own| own.get_name().to_owned())
+                    .filter(|command| !command.is_hide_set())
+                    .map(|command| command.get_name().to_owned())
                     .collect(),
                 files: false,
             }
@@ -288,18 +290,18 @@ mod tests {
         let mut open = vec![command()];
         while let Some(level) = open.pop() {
             open.extend(level.get_subcommands().cloned());
-            for own in level
+            for argument in level
                 .get_arguments()
-                .filter(|own| own.get_action().takes_values())
+                .filter(|argument| argument.get_action().takes_values())
             {
-                let known = values(own, "", None) != Fitting::default();
-                let name = own.get_value_names().and_then(<[_]>::first);
+                let known = values(argument, "", None) != Fitting::default();
+                let name = argument.get_value_names().and_then(<[_]>::first);
                 let name = name.map_or("", |name| name.as_str());
                 assert!(
                     known || FREE.contains(&name),
                     "{} {}: {name}",
                     level.get_name(),
-                    own.get_id()
+                    argument.get_id()
                 );
             }
         }

@@ -98,18 +98,18 @@ pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Re
         return install(folder.as_deref(), output);
     }
     let interface = arguments.extcap_interface.as_deref();
-    let known = |own: &str| simulated_bus(own).is_some() || own.starts_with(RIG);
+    let known = |name: &str| simulated_bus(name).is_some() || name.starts_with(RIG);
     match interface {
         _ if arguments.extcap_interfaces => output.result(&interfaces())?,
-        Some(own) if !known(own) => {
+        Some(name) if !known(name) => {
             output.complain(&format!(
-                "there is no interface `{own}`; `drivebench extcap --extcap-interfaces` lists them"
+                "there is no interface `{name}`; `drivebench extcap --extcap-interfaces` lists them"
             ));
             return Ok(Exit::Usage);
         }
-        Some(own) if arguments.extcap_dlts => output.result(&link_types(own))?,
-        Some(own) if arguments.extcap_config => output.result(&config(own))?,
-        Some(own) if arguments.capture => return capture(own, arguments, output),
+        Some(name) if arguments.extcap_dlts => output.result(&link_types(name))?,
+        Some(name) if arguments.extcap_config => output.result(&config(name))?,
+        Some(name) if arguments.capture => return capture(name, arguments, output),
         _ => {
             output.complain(
                 "Wireshark starts this command; `drivebench extcap install` installs it, and `--extcap-interfaces` lists interfaces",
@@ -123,7 +123,7 @@ pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Re
 /// A text as the value of a field.
 fn field(text: &str) -> String {
     text.chars()
-        .filter(|own| !"{}\n\r".contains(*own))
+        .filter(|letter| !"{}\n\r".contains(*letter))
         .collect()
 }
 
@@ -161,8 +161,8 @@ fn interfaces() -> String {
         let rig = place
             .source()
             .ok()
-            .and_then(|own| find::read(&own, &RIG_BUSES).ok());
-        if rig.is_some_and(|own| taps_of(&own).is_ok()) {
+            .and_then(|source| find::read(&source, &RIG_BUSES).ok());
+        if rig.is_some_and(|rig| taps_of(&rig).is_ok()) {
             let name = field(&name);
             let _infallible = writeln!(
                 text,
@@ -177,7 +177,7 @@ fn interfaces() -> String {
 fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
     let rig = rig.and_then(|name| find(name, &find::folder(), &RIG_BUSES).ok());
-    let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
+    let adapter = rig.is_some_and(|rig| rig.port().is_some_and(|rig| rig.can_adapter().is_some()));
     let frames =
         adapter || simulated_bus(interface).is_some_and(|bus| bus.carries == Carries::Frames);
     let (number, name, display) = match frames {
@@ -277,7 +277,7 @@ fn play_into(pipe: &File, tape: &Tape) -> Result<(), String> {
     let stop = signals::interrupt_flag();
     let failed = |error: &io::Error| format!("failed to write to the pipe: {error}");
     let mut recorder = match LiveRecorder::start(pipe, &tape.places) {
-        Ok(own) => own,
+        Ok(recorder) => recorder,
         Err(error) => return closed(&error).ok_or_else(|| failed(&error)),
     };
     while !stop.load(Ordering::Relaxed) {
@@ -353,10 +353,10 @@ fn folders() -> Result<PathBuf, String> {
 fn folder_of(text: &str) -> Option<PathBuf> {
     let value = |key: &str| {
         let line = text.lines().find_map(|line| line.strip_prefix(key));
-        line.map(|own| PathBuf::from(own.trim()))
+        line.map(|folder| PathBuf::from(folder.trim()))
     };
-    let own = value("Personal Extcap path:");
-    own.or_else(|| value("Personal configuration:").map(|own| own.join("extcap")))
+    let folder = value("Personal Extcap path:");
+    folder.or_else(|| value("Personal configuration:").map(|folder| folder.join("extcap")))
 }
 
 fn link(folder: &Path) -> Result<PathBuf, String> {
@@ -365,7 +365,7 @@ fn link(folder: &Path) -> Result<PathBuf, String> {
     std::fs::create_dir_all(folder).map_err(failed)?;
     let path = folder.join(PROGRAM);
     match path.symlink_metadata() {
-        Ok(own) if own.is_symlink() => std::fs::remove_file(&path).map_err(failed)?,
+        Ok(metadata) if metadata.is_symlink() => std::fs::remove_file(&path).map_err(failed)?,
         Ok(_) => {
             return Err(format!(
                 "{} is there already and is no link; remove it first",

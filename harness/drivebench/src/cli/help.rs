@@ -70,21 +70,21 @@ pub(crate) fn command() -> Command {
 fn template(command: &Command) -> StyledStr {
     let header = command.get_styles().get_header();
     let name = command.get_styles().get_literal();
-    let width = command.get_subcommands().map(|own| own.get_name().len());
-    let width = width.max().unwrap_or_default();
+    let names = command.get_subcommands().map(Command::get_name);
+    let width = names.map(str::len).max().unwrap_or_default();
     let mut text = String::from("{about-with-newline}\n{usage-heading} {usage}\n");
     for (group, names) in GROUPS {
         // Writing to a String cannot fail.
         let _infallible = write!(text, "\n{header}{group}:{header:#}\n");
-        for own in names
+        for subcommand in names
             .iter()
             .filter_map(|name| command.find_subcommand(name))
         {
-            let about = own.get_about().map(ToString::to_string);
+            let about = subcommand.get_about().map(ToString::to_string);
             let _infallible = writeln!(
                 text,
                 "  {name}{:width$}{name:#}  {}",
-                own.get_name(),
+                subcommand.get_name(),
                 about.unwrap_or_default()
             );
         }
@@ -103,8 +103,8 @@ fn template(command: &Command) -> StyledStr {
 pub(crate) fn parse() -> Result<Arguments, clap::Error> {
     let mut given: Vec<OsString> = std::env::args_os().collect();
     // Wireshark starts the program by the name of its link, without a command.
-    let name = given.first().and_then(|own| Path::new(own).file_name());
-    if name.is_some_and(|own| own == super::extcap::PROGRAM) {
+    let name = given.first().and_then(|path| Path::new(path).file_name());
+    if name.is_some_and(|name| name == super::extcap::PROGRAM) {
         given.insert(1, "extcap".into());
     }
     let command = command().color(crate::command::output::colour_of_usage());
@@ -127,7 +127,8 @@ fn with_suggestion(mut error: clap::Error, command: &Command, given: &[OsString]
         return error;
     }
     let mut level = command;
-    for argument in given.iter().skip(1).take_while(|own| **own != *word) {
+    let front = given.iter().skip(1);
+    for argument in front.take_while(|argument| **argument != *word) {
         level = level.find_subcommand(argument).unwrap_or(level);
     }
     let names: Vec<_> = level.get_subcommands().map(Command::get_name).collect();
@@ -156,7 +157,7 @@ mod tests {
         let mut grouped: Vec<_> = GROUPS.iter().flat_map(|(_, names)| *names).collect();
         let mut known: Vec<_> = command
             .get_subcommands()
-            .filter(|own| !own.is_hide_set())
+            .filter(|command| !command.is_hide_set())
             .map(Command::get_name)
             .collect();
         grouped.sort();
@@ -167,12 +168,14 @@ mod tests {
     /// A line of the list fits a terminal of 100 columns.
     #[test]
     fn what_a_command_does_is_said_in_a_line() {
-        for own in command().get_subcommands() {
-            let about = own.get_about().map(ToString::to_string).unwrap_or_default();
+        for command in command().get_subcommands() {
+            let about = command
+                .get_about()
+                .map_or(String::new(), ToString::to_string);
             assert!(
                 (1..=84).contains(&about.len()),
                 "{}: {about}",
-                own.get_name()
+                command.get_name()
             );
         }
     }

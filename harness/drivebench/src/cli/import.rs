@@ -31,7 +31,8 @@ pub(crate) fn dissector(bus: BusName, output: &mut Output) -> std::io::Result<Ex
 
 /// Prints the file that describes this number of drives: a DBC of frames on CAN, the GSD of slaves on PROFIBUS DP.
 pub(crate) fn description(
-    (carries, drives): (Carries, u16),
+    carries: Carries,
+    drives: u16,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     if let Some(line) = carrying(carries) {
@@ -63,7 +64,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         {
             return Ok(Exit::Usage);
         }
-        let written = show((bus.report, &shown), format, &arguments.showing, output)?;
+        let written = show(bus.report, &shown, format, &arguments.showing, output)?;
         return Ok(if written {
             Exit::Passed
         } else {
@@ -91,7 +92,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             true => (bus.replayed)(capture, &options)
                 .map(|text| write_scenario(&text, arguments, output)),
             false => (bus.judged)(capture, &options)
-                .map(|judged| tell(&judged, (&imported, &title), output)),
+                .map(|judged| tell(&judged, &imported, &title, output)),
         };
     done.unwrap_or_else(|error| {
         output.complain(&format!("{}: {error}", path.display()));
@@ -102,7 +103,8 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
 /// Reports what came of judging a capture, of which a part may be missing.
 fn tell(
     judged: &JudgedCapture,
-    (imported, title): (&Imported, &str),
+    imported: &Imported,
+    title: &str,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let (verdict, why) = imported.settle(judged.verdict);
@@ -159,7 +161,7 @@ fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> O
             None
         }
         Err(error) => {
-            let names = paths.iter().map(|own| own.display().to_string());
+            let names = paths.iter().map(|path| path.display().to_string());
             let names: Vec<_> = names.collect();
             output.complain(&format!("{}: {error}", names.join(", ")));
             None
@@ -199,7 +201,7 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         return Ok(Exit::Incomplete);
     }
     let names = [title(&arguments.left), title(&arguments.right)];
-    let [one, other] = [&left, &right].map(|own| report_of(&own.traces));
+    let [one, other] = [&left, &right].map(|capture| report_of(&capture.traces));
     if one.carries() != other.carries() {
         output.complain(&format!(
             "one side has {} and the other {}; two of one kind expected",
@@ -228,7 +230,7 @@ fn is_silent(capture: &Capture) -> bool {
 fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<Capture> {
     if is_capture(path) {
         let read = read(&[path.to_owned()], &arguments.reading, output);
-        return read.map(|own| own.capture);
+        return read.map(|read| read.capture);
     }
     let sources = match sources(&[path.to_owned()]) {
         Ok(sources) => sources,

@@ -54,7 +54,7 @@ const SILENT: u64 = 10_000_000_000;
 /// The lines of pieces, each with the time of what it is of.
 fn lines(place: &RecordedPlace, drives: Option<u8>, pieces: &[Piece]) -> String {
     let mut text = (carrier(place.carries).live)(place, drives);
-    let mut lines: Vec<LiveLine> = pieces.iter().flat_map(|own| text.piece(own)).collect();
+    let mut lines: Vec<LiveLine> = pieces.iter().flat_map(|piece| text.piece(piece)).collect();
     lines.extend(std::iter::from_fn(|| text.idle(SILENT)));
     let line = |(nanos, words): LiveLine| format!("{} {words}\n", seconds(nanos));
     lines.into_iter().map(line).collect()
@@ -96,18 +96,18 @@ fn a_fault_of_a_ring_is_named() {
 #[test]
 fn frames_and_telegrams() {
     let frames = traces("unitek-5.2-once");
-    let frames = frames[0].channels.iter().flat_map(|own| own.frames());
+    let frames = frames[0].channels.iter().flat_map(Channel::frames);
     let frames: Vec<_> = frames.copied().map(Piece::Frame).collect();
     let shown = lines(&place("can0", Carries::Frames, 500_000), None, &frames);
     let line = traces("nordac-3.1-ppo-1");
     let channels = line[0].channels.iter();
-    let mut octets: Vec<_> = channels.flat_map(|own| own.octets().to_vec()).collect();
-    octets.sort_by_key(|own| own.at);
+    let mut octets: Vec<_> = channels.flat_map(Channel::octets).copied().collect();
+    octets.sort_by_key(|octet| octet.at);
     let mut cutter = TelegramCutter::new(Span::from_micros(22));
     let mut pieces = Vec::new();
-    for own in &octets {
-        let nanos = own.at.since_start().as_nanos();
-        cutter.push(nanos, Received::good(own.received.expect("an octet")));
+    for octet in &octets {
+        let nanos = octet.at.since_start().as_nanos();
+        cutter.push(nanos, Received::good(octet.received.expect("an octet")));
         let cut = cutter.cut(nanos).into_iter();
         pieces.extend(cut.map(|(from, octets)| Piece::Telegram(from, octets)));
     }
@@ -136,25 +136,25 @@ fn every_bus_is_heard_again() {
         let tape = Tape::of(&traces, Rate::default());
         assert_eq!(tape.places.len(), places, "{name}");
         let as_expected =
-            |own: &RecordedPlace| own.carries == carries && own.bits_per_second == bits;
+            |place: &RecordedPlace| place.carries == carries && place.bits_per_second == bits;
         assert!(tape.places.iter().all(as_expected), "{:?}", tape.places);
         assert!(tape.pieces.is_sorted_by_key(|(at, ..)| *at), "{name}");
-        let channels = traces.iter().flat_map(|own| &own.channels);
+        let channels = traces.iter().flat_map(|trace| &trace.channels);
         let carried: usize = match carries {
-            Carries::Frames => channels.map(|own| own.frames().len()).sum(),
-            _ => channels.map(|own| own.octets().len()).sum(),
+            Carries::Frames => channels.map(|channel| channel.frames().len()).sum(),
+            _ => channels.map(|channel| channel.octets().len()).sum(),
         };
         let lasts = |piece: &Piece| match piece {
-            Piece::Frame(own) => own.at.since(own.start),
+            Piece::Frame(frame) => frame.at.since(frame.start),
             _ => Span::ZERO,
         };
         let heard = |(at, _, piece): &(_, usize, Piece)| {
             let later = piece.later(hour);
             assert_eq!(lasts(&later), lasts(piece), "{name}");
             let (end, count) = match later {
-                Piece::Octet(own) => (Some(own.at), 1),
-                Piece::Telegram(_, octets) => (octets.last().map(|own| own.at), octets.len()),
-                Piece::Frame(own) => (Some(own.at), 1),
+                Piece::Octet(octet) => (Some(octet.at), 1),
+                Piece::Telegram(_, octets) => (octets.last().map(|octet| octet.at), octets.len()),
+                Piece::Frame(frame) => (Some(frame.at), 1),
                 Piece::Event(..) => (None, 0),
             };
             assert_eq!(end, Some(*at + hour), "{name}");
@@ -200,7 +200,7 @@ fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
     let folder = format!("{}/corpora/scenarios/{bus}", env!("TREE"));
     let files = std::fs::read_dir(folder).expect("a folder");
     let mut names: Vec<String> = files
-        .map(|own| own.expect("a file").path())
+        .map(|entry| entry.expect("a file").path())
         .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
         .collect();
     names.sort();
@@ -210,7 +210,7 @@ fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
     let all = all.filter(|(_, name)| name != "nordac-en-1-t-syn");
     let right = all.filter(|(tape, _)| (1..=MOST_PIECES).contains(&tape.pieces.len()));
     let right = right.filter(|(tape, _)| {
-        verdict(&begun_at(tape, 0, 0)).is_some_and(|own| own != Verdict::Failed)
+        verdict(&begun_at(tape, 0, 0)).is_some_and(|verdict| verdict != Verdict::Failed)
     });
     right.map(|(tape, name)| (name, tape)).collect()
 }
@@ -225,7 +225,7 @@ fn verdict(capture: &Capture) -> Option<Verdict> {
         ..JudgeOptions::default()
     };
     let judged = (carrier(carries).judged)(capture, &options).ok();
-    judged.map(|own| own.verdict)
+    judged.map(|judged| judged.verdict)
 }
 
 /// No right drive is blamed in a capture that begins at any of `cuts` places; returns how many captures passed.
@@ -276,8 +276,8 @@ fn captures_begun_in_mid_conversation_find_wrong_drives() {
         let source = Source::from_bytes("right".to_owned(), text.into_bytes()).expect("text");
         let mut tape = Tape::of(&traces_of(source), Rate::default());
         for (_, place, piece) in &mut tape.pieces[first..first + 40] {
-            if let (Piece::Octet(own), "0->master") = (piece, &*tape.places[*place].name) {
-                (own.sent, own.received) = (Some(0x55), Some(0x55));
+            if let (Piece::Octet(octet), "0->master") = (piece, &*tape.places[*place].name) {
+                (octet.sent, octet.received) = (Some(0x55), Some(0x55));
             }
         }
         verdict(&begun_at(&tape, first, 0))
@@ -301,7 +301,7 @@ fn what_was_set_before_a_ring_is_captured_blames_no_right_drive() {
         let tape = Tape::of(&traces(name), Rate::default());
         let found = verdict(&begun_at(&tape, first, 0));
         assert!(
-            found.is_some_and(|own| own != Verdict::Failed),
+            found.is_some_and(|verdict| verdict != Verdict::Failed),
             "{name} from piece {first}"
         );
     }
@@ -351,7 +351,7 @@ fn what_was_set_before_a_ring_is_captured_blames_no_right_drive() {
         };
         let found = begun("", &then);
         assert!(
-            found.is_some_and(|own| own != Verdict::Failed),
+            found.is_some_and(|verdict| verdict != Verdict::Failed),
             "{before}-- {then}: {found:?}"
         );
         let later = ["wait 20ms\n", read].concat().repeat(3);

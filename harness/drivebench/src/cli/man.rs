@@ -31,8 +31,8 @@ pub(crate) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result
 
 /// Hides the commands `help`: clap would make a page of each command once more below them.
 fn without_help(command: Command) -> Command {
-    command.mut_subcommands(|own| match own.get_name() {
-        "help" => own.hide(true),
-        _ => without_help(own),
+    command.mut_subcommands(|subcommand| match subcommand.get_name() {
+        "help" => subcommand.hide(true),
+        _ => without_help(subcommand),
     })
 }

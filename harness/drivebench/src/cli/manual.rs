@@ -34,14 +34,14 @@ pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::i
                 return Ok(Exit::RigError);
             }
         };
-        let own = [
+        let sections = [
             coverage(manual, &tables, &entries, arguments.missing, &wanted),
             ledger(&errata, &entries, arguments.missing, &wanted),
             open_points(manual, &wanted),
         ];
         // Of a manual of which nothing is wanted, nothing is shown.
-        if filter.is_empty() || own.iter().any(|(found, _)| *found) {
-            parts.push(own.map(|(_, text)| text).join("\n"));
+        if filter.is_empty() || sections.iter().any(|(found, _)| *found) {
+            parts.push(sections.map(|(_, text)| text).join("\n"));
         }
     }
     if parts.is_empty() {

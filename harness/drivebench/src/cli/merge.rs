@@ -27,7 +27,7 @@ pub struct MergeArguments {
 
 /// Merges the folders of parts.
 pub(crate) fn merge(arguments: &MergeArguments, output: &mut Output) -> std::io::Result<Exit> {
-    if arguments.folders.iter().any(|own| own.is_file()) {
+    if arguments.folders.iter().any(|folder| folder.is_file()) {
         return merge_counts(arguments, output);
     }
     let merged = match join(&arguments.folders, &arguments.output) {
@@ -40,7 +40,7 @@ pub(crate) fn merge(arguments: &MergeArguments, output: &mut Output) -> std::io:
     for (name, verdict) in merged
         .verdicts
         .iter()
-        .filter(|own| own.1 != Verdict::Passed)
+        .filter(|case| case.1 != Verdict::Passed)
     {
         output.result(&format!("{} {name}\n", output.verdict(*verdict)))?;
     }

@@ -37,14 +37,16 @@ pub(crate) fn merge_counts(
         return Ok(Exit::RigError);
     }
     let MergedCounts { file, missing } = merged;
-    for own in &file.campaigns {
-        output.result(&table(own, missing.is_empty()))?;
+    for campaign in &file.campaigns {
+        output.result(&table(campaign, missing.is_empty()))?;
     }
     for part in &missing {
         output.result(&format!("incomplete   part {part} is missing\n"))?;
     }
-    let nothing = file.campaigns.iter().all(|own| own.played() == Some(0));
-    let differs = file.campaigns.iter().any(|own| !own.differs().is_empty());
+    let mut campaigns = file.campaigns.iter();
+    let nothing = campaigns.all(|campaign| campaign.played() == Some(0));
+    let mut campaigns = file.campaigns.iter();
+    let differs = campaigns.any(|campaign| !campaign.differs().is_empty());
     Ok(match (missing.is_empty(), differs) {
         (false, _) => Exit::Incomplete,
         (true, true) => Exit::Failed,
@@ -54,19 +56,20 @@ pub(crate) fn merge_counts(
 }
 
 /// The counts of a campaign; what is pinned is compared only where no part is missing.
-fn table(own: &CampaignCounts, whole: bool) -> String {
-    if let Some(pairs) = own.pairs() {
+fn table(campaign: &CampaignCounts, whole: bool) -> String {
+    if let Some(pairs) = campaign.pairs() {
         return pairs.table() + "\n";
     }
-    let played = own.played().unwrap_or(u64::MAX);
-    let mut text = format!("{}: {played} of {} cases\n\n", own.name, own.cases);
+    let played = campaign.played().unwrap_or(u64::MAX);
+    let CampaignCounts { name, cases, .. } = campaign;
+    let mut text = format!("{name}: {played} of {cases} cases\n\n");
     // Writing to a String cannot fail.
     let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
-    for count in &own.counts {
+    for count in &campaign.counts {
         let part = share(count.cases, played);
         let _infallible = writeln!(text, "  {:18} {:>8} {part:>9}", count.class, count.cases);
     }
-    for (class, expected, found) in own.differs().into_iter().filter(|_| whole) {
+    for (class, expected, found) in campaign.differs().into_iter().filter(|_| whole) {
         let _infallible = writeln!(
             text,
             "  differs: {class} is {found}, the file pins {expected}"

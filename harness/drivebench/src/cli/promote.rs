@@ -16,7 +16,7 @@ use crate::scenario::verdict::Verdict;
 /// Keeps a finding, whatever its bus.
 pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
     match fuzz_of(bus_of(&arguments.finding).unwrap_or(BusName::DEFAULT)) {
-        Some(own) => (own.promote)(arguments, played, output),
+        Some(fuzz) => (fuzz.promote)(arguments, played, output),
         None => Ok(Exit::Usage),
     }
 }

@@ -19,7 +19,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     let Some(rig) = find_any_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
-    let size = Some(rig.ring_size()).filter(|own| *own > 0);
+    let size = Some(rig.ring_size()).filter(|size| *size > 0);
     let entries = match select(&arguments.selection, size) {
         Ok(entries) => of_rig(entries, &rig, output),
         Err(errors) => {
@@ -34,7 +34,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     let filter = arguments.selection.filter.as_deref();
     let part = arguments
         .partition
-        .map(|own| SplitRun::new(own, filter, &entries, |_| false));
+        .map(|partition| SplitRun::new(partition, filter, &entries, |_| false));
     let entries = match &part {
         Some(part) => part.share(entries),
         None => entries,

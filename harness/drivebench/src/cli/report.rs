@@ -44,7 +44,7 @@ fn explored(arguments: &ReportArguments, output: &mut Output) -> Exit {
         );
         return Exit::Usage;
     }
-    let page = fuzz_of(BusName::DEFAULT).and_then(|own| own.page);
+    let page = fuzz_of(BusName::DEFAULT).and_then(|fuzz| fuzz.page);
     let text = match page.map(|page| page(&arguments.folder)) {
         Some(Ok(text)) => text,
         None => return Exit::Usage,

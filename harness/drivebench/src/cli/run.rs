@@ -123,10 +123,10 @@ fn read_rig_and_scenarios(
         None => None,
         Some(name) => Some(find_any_rig(name, output).ok_or(Exit::Usage)?),
     };
-    let own = rig.as_ref().map(Rig::ring_size).filter(|own| *own > 0);
+    let size = rig.as_ref().map(Rig::ring_size).filter(|size| *size > 0);
     let selected = match arguments.ring {
         Some(asked) => select_of_size(&arguments.selection, asked),
-        None => select(&arguments.selection, own),
+        None => select(&arguments.selection, size),
     };
     let entries = selected.map_err(|errors| {
         errors.iter().for_each(|error| output.library_error(error));
@@ -167,9 +167,11 @@ fn choose(arguments: &RunArguments, output: &mut Output) -> Result<Chosen, Exit>
     }
     let filter = arguments.selection.filter.as_deref();
     let named = &arguments.selection.paths;
-    let part = arguments
-        .partition
-        .map(|own| SplitRun::new(own, filter, &entries, |entry| is_named(named, &entry.name)));
+    let part = arguments.partition.map(|partition| {
+        SplitRun::new(partition, filter, &entries, |entry| {
+            is_named(named, &entry.name)
+        })
+    });
     if let Some(part) = &part {
         entries = part.share(entries);
         if entries.is_empty() {
@@ -419,7 +421,7 @@ mod tests {
         assert_eq!(selected("10.5-silent-self-test"), 1);
         let step = "read-byte 1 FE10";
         let built_in = sources(&[]).expect("the built-in ones");
-        assert!(built_in.iter().any(|own| may_match(own, step)));
+        assert!(built_in.iter().any(|source| may_match(source, step)));
         assert_eq!(selected(step), 0);
     }
 
@@ -428,7 +430,8 @@ mod tests {
     fn what_matches_may_match() {
         for source in sources(&[]).expect("the built-in ones") {
             let entry = Entry::new(source.clone(), None).expect("a scenario");
-            let cited = entry.scenario.sources.iter().map(|own| own.text.as_str());
+            let cited = entry.scenario.sources.iter();
+            let cited = cited.map(|source| source.text.as_str());
             for place in cited.chain([entry.name.as_str(), &entry.scenario.title]) {
                 assert!(entry.matches(place) && may_match(&source, place), "{place}");
             }

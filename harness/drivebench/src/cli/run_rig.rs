@@ -101,8 +101,15 @@ pub(crate) fn work(
         Err(error) => return Ok(tell_session(&error, output)),
     };
     let mut folder = None;
-    let kept = (&mut folder, page.as_mut());
-    let exit = match all((rig, &mut *run), entries, job, kept, output) {
+    let exit = match all(
+        rig,
+        &mut *run,
+        entries,
+        job,
+        &mut folder,
+        page.as_mut(),
+        output,
+    ) {
         Ok(exit) => exit,
         Err(EarlyEnd::Session(error)) => tell_session(&error, output),
         Err(EarlyEnd::Evidence(error)) => {
@@ -196,10 +203,12 @@ pub(crate) fn reports(
 }
 
 fn all(
-    (rig, run): (&Rig, &mut dyn RigRun),
+    rig: &Rig,
+    run: &mut dyn RigRun,
     entries: &[Entry],
     job: &PlayOrder,
-    (folder, page): (&mut Option<Folder>, Option<&mut Page>),
+    folder: &mut Option<Folder>,
+    page: Option<&mut Page>,
     output: &mut Output,
 ) -> Result<Exit, EarlyEnd> {
     for why in run.obstacles()? {
@@ -222,18 +231,9 @@ fn all(
         };
         *folder = Some(Folder::create(path, &about)?);
     }
-    let mut exit = selected(
-        (rig, &mut *run),
-        entries,
-        job,
-        (folder.as_mut(), page),
-        output,
-    )?;
+    let mut exit = selected(rig, &mut *run, entries, job, folder.as_mut(), page, output)?;
     if job.qualify {
-        exit = worse(
-            exit,
-            qualify((rig, &mut *run), job, folder.as_mut(), output)?,
-        );
+        exit = worse(exit, qualify(rig, &mut *run, job, folder.as_mut(), output)?);
     }
     for line in run.measured() {
         output.say(&line);
@@ -252,10 +252,12 @@ pub(super) fn worse(scenarios: Exit, all: Exit) -> Exit {
 
 /// Plays the selected scenarios one after another and reports each. Returns the exit code of their verdicts.
 fn selected(
-    (rig, run): (&Rig, &mut dyn RigRun),
+    rig: &Rig,
+    run: &mut dyn RigRun,
     entries: &[Entry],
     job: &PlayOrder,
-    (mut folder, mut page): (Option<&mut Folder>, Option<&mut Page>),
+    mut folder: Option<&mut Folder>,
+    mut page: Option<&mut Page>,
     output: &mut Output,
 ) -> Result<Exit, EarlyEnd> {
     let bar = progress_bar(entries.len(), output.progress);
@@ -334,7 +336,8 @@ fn keep(
 
 /// Plays what a qualification plays behind the selected scenarios, and writes what all of it comes to.
 fn qualify(
-    (rig, run): (&Rig, &mut dyn RigRun),
+    rig: &Rig,
+    run: &mut dyn RigRun,
     job: &PlayOrder,
     folder: Option<&mut Folder>,
     output: &mut Output,
@@ -378,7 +381,7 @@ struct QualificationShell<'s> {
 
 impl QualificationShell<'_> {
     fn entry(&mut self, source: &Source) -> Result<Entry, QualificationStopped> {
-        let drives = Some(self.rig.ring_size()).filter(|own| *own > 0);
+        let drives = Some(self.rig.ring_size()).filter(|size| *size > 0);
         Entry::fitting(source.clone(), drives).map_err(|problems| {
             self.output.mistakes(&problems);
             QualificationStopped
@@ -399,7 +402,7 @@ impl QualificationShell<'_> {
 impl QualificationKeeper for QualificationShell<'_> {
     fn began(&self) -> String {
         let folder = self.folder.as_ref();
-        folder.map_or_else(String::new, |own| own.began().to_owned())
+        folder.map_or_else(String::new, |folder| folder.began().to_owned())
     }
 
     fn play(

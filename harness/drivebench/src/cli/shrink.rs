@@ -10,7 +10,7 @@ use crate::explore::bus_of;
 /// Makes a finding small, and writes what came of it beside it.
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
     match fuzz_of(bus_of(&arguments.finding).unwrap_or(BusName::DEFAULT)) {
-        Some(own) => (own.shrink)(arguments, &RIG_BUSES, output),
+        Some(fuzz) => (fuzz.shrink)(arguments, &RIG_BUSES, output),
         None => Ok(Exit::Usage),
     }
 }

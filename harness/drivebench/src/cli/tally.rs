@@ -112,7 +112,7 @@ impl Tally {
         self.verdicts.push(outcome.verdict);
         self.took = self.took + outcome.took;
         if let Some(reason) = outcome.skip.as_ref().map(|skip| skip.why.group()) {
-            match self.skipped.iter_mut().find(|(own, _)| *own == reason) {
+            match self.skipped.iter_mut().find(|(known, _)| *known == reason) {
                 Some((_, count)) => *count += 1,
                 None => self.skipped.push((reason, 1)),
             }

@@ -30,7 +30,7 @@ fn played(text: &str) -> (Entry, Outcome, Vec<Trace>) {
 }
 
 /// The page of HTML that `run --html` writes.
-fn html((entry, outcome, traces): &(Entry, Outcome, Vec<Trace>)) -> String {
+fn html(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     let shown = ScenarioView {
         name: entry.short_name(),
         title: &entry.scenario.title,
@@ -55,9 +55,9 @@ const OPENS: &str = "valve 1\n\nopen 1 = 50\n? valve 1 at 50\n+0.1ms > 101 00\n<
 
 #[test]
 fn from_a_scenario_to_a_table_and_a_page() {
-    let all = played(OPENS);
-    let (entry, outcome, traces) = &all;
-    assert_eq!(outcome.finding.as_ref().map(|own| &own.message), None);
+    let (entry, outcome, traces) = &played(OPENS);
+    let message = outcome.finding.as_ref().map(|mismatch| &mismatch.message);
+    assert_eq!(message, None);
     assert_eq!(outcome.verdict, Verdict::Passed);
     let table = "meaning\n0.126 ms  valve 1: go to 50 %\n0.352 ms  valve 1 is at 50 %\n";
     let text = page(entry, outcome, traces);
@@ -66,15 +66,14 @@ fn from_a_scenario_to_a_table_and_a_page() {
         "{text}"
     );
     assert!(text.contains(table), "{text}");
-    let html = html(&all);
+    let html = html(entry, outcome, traces);
     assert!(html.contains("valve 1: go to 50 %"), "{html}");
     assert!(html.contains("passed"), "{html}");
 }
 
 #[test]
 fn a_wrong_device_fails_in_the_words_of_its_bus() {
-    let all = played(&OPENS.replace("valve 1\n\n", "valve 1 sticks\n\n"));
-    let (entry, outcome, traces) = &all;
+    let (entry, outcome, traces) = &played(&OPENS.replace("valve 1\n\n", "valve 1 sticks\n\n"));
     let finding = outcome.finding.as_ref().expect("it fails");
     assert_eq!(outcome.verdict, Verdict::Failed);
     let expected = "the master received 201#0100 where 201 01 32 is expected";
@@ -86,9 +85,9 @@ fn a_wrong_device_fails_in_the_words_of_its_bus() {
     );
     assert!(text.contains("    open 1 = 50\n"), "{text}");
     assert!(text.contains("valve 1 is at 0 %\n"), "{text}");
-    assert!(html(&all).contains(expected));
+    assert!(html(entry, outcome, traces).contains(expected));
     let (_, outcome, _) = played("valve 1 sticks\n\n> 101 01 32\n< 201 01 xx\n? valve 1 at 50\n");
-    let message = outcome.finding.map(|own| own.message);
+    let message = outcome.finding.map(|mismatch| mismatch.message);
     assert_eq!(message.as_deref(), Some("valve 1 is at 0 %, expected 50 %"));
 }
 
@@ -96,7 +95,9 @@ fn a_wrong_device_fails_in_the_words_of_its_bus() {
 fn what_no_line_asks_for_is_a_failure() {
     let (_, outcome, _) = played("valve 1\n\n> 101 00\n");
     assert_eq!(outcome.verdict, Verdict::Failed);
-    let message = outcome.finding.map(|own| own.message).unwrap_or_default();
+    let message = outcome
+        .finding
+        .map_or(String::new(), |mismatch| mismatch.message);
     assert!(message.starts_with("201#0000 was received"), "{message}");
 }
 

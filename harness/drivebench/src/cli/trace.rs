@@ -55,7 +55,7 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
         rate: entry.rate(),
         records: &played.outcome.records,
     };
-    if !show((entry.report, &shown), arguments.format, showing, output)? {
+    if !show(entry.report, &shown, arguments.format, showing, output)? {
         return Ok(Exit::RigError);
     }
     output.say(&details(&entry, &played.outcome, &played.traces));
@@ -80,17 +80,18 @@ pub(crate) fn fits_output(format: TraceFormat, showing: &TraceOutput, output: &m
 
 /// Shows a run. Returns false after reporting that the file could not be written.
 pub(crate) fn show(
-    shown: (&dyn SegmentReport, &ShownRun<'_>),
+    report: &dyn SegmentReport,
+    shown: &ShownRun<'_>,
     format: TraceFormat,
     showing: &TraceOutput,
     output: &mut Output,
 ) -> std::io::Result<bool> {
     let Some(path) = &showing.output else {
         let out = BufWriter::new(std::io::stdout().lock());
-        unless_closed(write(shown, format, showing, out))?;
+        unless_closed(write(report, shown, format, showing, out))?;
         return Ok(true);
     };
-    match regular::write(path, |out| write(shown, format, showing, out)) {
+    match regular::write(path, |out| write(report, shown, format, showing, out)) {
         Ok(()) => Ok(true),
         Err(error) => {
             output.complain(&format!("failed to write {}: {error}", path.display()));
@@ -100,7 +101,8 @@ pub(crate) fn show(
 }
 
 fn write(
-    (report, shown): (&dyn SegmentReport, &ShownRun<'_>),
+    report: &dyn SegmentReport,
+    shown: &ShownRun<'_>,
     format: TraceFormat,
     showing: &TraceOutput,
     mut out: impl Write,

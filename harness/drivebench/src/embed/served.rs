@@ -21,7 +21,7 @@ impl Served {
     /// `setup` has mistakes, the address is in use, or other machines would reach it.
     pub fn ring(drives: u8, setup: &str, address: &str) -> Result<Self, Error> {
         let thread = (embedding().served)(drives, setup, address)?;
-        let place = thread.places().first().and_then(|own| own.parse().ok());
+        let place = thread.places().first().and_then(|place| place.parse().ok());
         let address =
             place.ok_or_else(|| Error::Serve(format!("failed to serve a ring at {address}")))?;
         Ok(Self {

@@ -78,9 +78,10 @@ pub(super) fn again(
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
+    let verdict = recorded.verdict.as_ref();
     let attempt = RecordedAttempt {
         events: &recorded.events,
-        unplaced: recorded.verdict.as_ref().map_or(0, |own| own.unplaced),
+        unplaced: verdict.map_or(0, |verdict| verdict.unplaced),
     };
     let judged = judge.judge(&source, attempt)?;
     let (other, made) = match &judged.played {
@@ -141,8 +142,8 @@ fn first_difference(recorded: &[LinkEvent], played: &[LinkEvent]) -> Option<Stri
     let written = |events: &[LinkEvent]| -> Vec<RecordLine> {
         events.iter().filter_map(RecordLine::of).collect()
     };
-    let (theirs, own) = (written(recorded), written(played));
-    let at = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at))?;
+    let (theirs, ours) = (written(recorded), written(played));
+    let at = (0..theirs.len().max(ours.len())).find(|at| theirs.get(*at) != ours.get(*at))?;
     let show = |line: Option<&RecordLine>| match line.map(serde_json::to_string) {
         Some(Ok(text)) => text,
         _ => "nothing more".to_owned(),
@@ -151,7 +152,7 @@ fn first_difference(recorded: &[LinkEvent], played: &[LinkEvent]) -> Option<Stri
         "event {}: the record has {}, the simulated rings give {}",
         at + 1,
         show(theirs.get(at)),
-        show(own.get(at))
+        show(ours.get(at))
     ))
 }
 
@@ -181,16 +182,17 @@ impl Recorded {
 
     /// What the record says of the attempt and its bytes do not bear out.
     pub(super) fn differs(&self, again: &Again, header: &Header) -> Option<String> {
-        let own = self.verdict.as_ref()?;
-        own.verdict_differs(again)
-            .or_else(|| self.unplaced_or_unused(own, header))
-            .or_else(|| own.remarks_differ(again))
-            .or_else(|| own.rest_differs(again, header))
+        let verdict = self.verdict.as_ref()?;
+        verdict
+            .verdict_differs(again)
+            .or_else(|| self.unplaced_or_unused(verdict, header))
+            .or_else(|| verdict.remarks_differ(again))
+            .or_else(|| verdict.rest_differs(again, header))
     }
 
     /// Line errors and unused faults that cannot have been.
-    fn unplaced_or_unused(&self, own: &Recalled, header: &Header) -> Option<String> {
-        if header.simulated && own.unplaced > 0 {
+    fn unplaced_or_unused(&self, verdict: &Recalled, header: &Header) -> Option<String> {
+        if header.simulated && verdict.unplaced > 0 {
             return Some("a simulated ring places every line error".to_owned());
         }
         let asked_for = self.events.iter().filter_map(|event| match event {
@@ -202,7 +204,7 @@ impl Recorded {
             _ => None,
         });
         let asked_for: Vec<String> = asked_for.collect();
-        let mut unused = own.unused().filter(|_| !header.simulated);
+        let mut unused = verdict.unused().filter(|_| !header.simulated);
         let invented = unused.find(|remark| !asked_for.contains(remark))?;
         Some(format!(
             "the record says \"{invented}\", but no such fault was asked for"
@@ -238,19 +240,19 @@ impl Recalled {
     /// Remarks and what came before the reset. Which faults never happened is not in the bytes that the master received.
     fn remarks_differ(&self, again: &Again) -> Option<String> {
         let settled = |remarks: &[String]| -> Vec<String> {
-            let remarks = remarks.iter();
-            let kept = remarks.filter(|own| again.capture.is_some() || !own.starts_with(UNUSED));
-            kept.cloned().collect()
+            let captured = again.capture.is_some();
+            let kept = |remark: &&String| captured || !remark.starts_with(UNUSED);
+            remarks.iter().filter(kept).cloned().collect()
         };
-        let (stated, own) = (
+        let (stated, given) = (
             settled(&self.remarks),
             settled(&again.attempt.outcome.remarks),
         );
-        if stated != own {
+        if stated != given {
             return Some(format!(
                 "the record remarks \"{}\", its bytes give \"{}\"",
                 stated.join("; "),
-                own.join("; ")
+                given.join("; ")
             ));
         }
         let opening = again.attempt.opening.as_deref();

@@ -31,8 +31,8 @@ pub(super) fn differences(opened: &Opened, judged: &[Judged<'_>], texts: Texts<'
         match line {
             RecordLine::Scenario { .. } => pending += 1,
             RecordLine::Case { .. } => {
-                let (own, rest) = left.split_at(pending.min(left.len()));
-                settling.case(line, own);
+                let (attempts, rest) = left.split_at(pending.min(left.len()));
+                settling.case(line, attempts);
                 (left, pending) = (rest, 0);
             }
             RecordLine::End { verdicts, safe } => settling.end(verdicts, *safe, &left[..pending]),
@@ -88,14 +88,15 @@ impl Settling<'_> {
         };
         must("title", title, &entry.scenario.title);
         must("drives", drives, &entry.drives());
-        for own in attempts {
-            must("name", name, &own.recorded.name);
+        for attempt in attempts {
+            must("name", name, &attempt.recorded.name);
         }
         // What is wrong with an attempt has been reported.
-        if attempts.iter().any(|own| own.differs.is_some()) {
+        if attempts.iter().any(|attempt| attempt.differs.is_some()) {
             return;
         }
-        if attempts.iter().any(|own| own.recorded.verdict.is_none()) {
+        let mut verdicts = attempts.iter().map(|attempt| &attempt.recorded.verdict);
+        if verdicts.any(Option::is_none) {
             return must("verdict", verdict, Verdict::RigError.name());
         }
         let outcome = match attempts {
@@ -123,7 +124,7 @@ impl Settling<'_> {
     /// Attempts are counted from 1, and there are as many as the rig's file asks for.
     fn numbers(&mut self, name: &str, attempts: &[Judged<'_>]) {
         let header = &self.opened.header;
-        let numbers = attempts.iter().map(|own| own.recorded.attempt);
+        let numbers = attempts.iter().map(|attempt| attempt.recorded.attempt);
         if !numbers.eq(1..=attempts.len()) {
             self.wrong
                 .push(format!("case {name}: its attempts are not numbered from 1"));
@@ -135,7 +136,7 @@ impl Settling<'_> {
         let most = attempts_of(&self.opened.rig, real, header.qualified);
         let all = settled(attempts);
         let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n], most));
-        let trouble = attempts.iter().any(|own| match &own.again {
+        let trouble = attempts.iter().any(|attempt| match &attempt.again {
             Ok((_, again)) => again.trouble,
             Err(_) => true,
         });
@@ -150,10 +151,10 @@ impl Settling<'_> {
     }
 
     fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[Judged<'_>]) {
-        if let Some(own) = left.first() {
+        if let Some(attempt) = left.first() {
             self.wrong.push(format!(
                 "{}: the record has its attempts and no line of what came of them",
-                own.recorded.name
+                attempt.recorded.name
             ));
         }
         if *verdicts != self.verdicts {
@@ -200,7 +201,7 @@ impl Judged<'_> {
     /// Whether the rig's line was lost in it, or the like: nothing is played behind it.
     pub(super) fn ends_the_run(&self) -> bool {
         let mut events = self.recorded.events.iter();
-        events.any(|own| matches!(own, LinkEvent::Trouble(trouble) if trouble.ends_a_run()))
+        events.any(|event| matches!(event, LinkEvent::Trouble(trouble) if trouble.ends_a_run()))
     }
 
     /// The attempt as it was judged again.

@@ -58,7 +58,7 @@ pub(super) fn derived(
     let all = case_reports(path, opened, judged, &|place| place + 1)?;
     let (cases, shown) = all
         .into_iter()
-        .map(|own| (own.junit, own.shown))
+        .map(|report| (report.junit, report.shown))
         .unzip::<_, _, Vec<_>, _>();
     Ok(Derived {
         html: run(&head(path, opened), shown),
@@ -92,15 +92,15 @@ pub(super) fn case_reports(
     number: &dyn Fn(usize) -> usize,
 ) -> Result<Vec<CaseReport>, EvidenceError> {
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
-    for own in judged {
-        let again = own.again.as_ref().ok();
+    for judged_attempt in judged {
+        let again = judged_attempt.again.as_ref().ok();
         // The last attempt is shown.
         let attempt = Attempt {
-            number: own.recorded.attempt,
+            number: judged_attempt.recorded.attempt,
             text: again.map_or_else(String::new, |(text, _)| text.clone()),
             outcome: again.map(|(_, again)| again.attempt.outcome.clone()),
         };
-        attempts.insert(own.recorded.name.clone(), attempt);
+        attempts.insert(judged_attempt.recorded.name.clone(), attempt);
     }
     let settled = opened.lines.iter().filter_map(Settled::of);
     let mut settled: Vec<_> = settled.collect();
@@ -136,14 +136,18 @@ pub(super) fn case_reports(
             },
             ..case.case(path, opened.rig.id())
         };
-        let shown_as = (number(place), opened.rate());
         reports.push(CaseReport {
-            shown: show(shown_as, &case, attempt, (&outcome, &traces), opened),
+            shown: show(number(place), &case, attempt, &outcome, &traces, opened),
             settled: case,
             junit,
         });
     }
     Ok(reports)
+}
+
+/// The verdict of this name.
+pub(super) fn verdict_named(name: &str) -> Option<Verdict> {
+    Verdict::ALL.into_iter().find(|known| known.name() == name)
 }
 
 /// The last attempt at a scenario.
@@ -195,7 +199,7 @@ impl Settled {
         else {
             return None;
         };
-        let verdict = Verdict::ALL.into_iter().find(|own| own.name() == verdict)?;
+        let verdict = verdict_named(verdict)?;
         Some(Self {
             name: name.clone(),
             title: title.clone(),
@@ -242,7 +246,7 @@ impl Settled {
     fn outcome(&self, judged: Option<&Outcome>) -> Outcome {
         let found = self.finding.as_ref().map(|message| {
             let same = judged.and_then(|outcome| outcome.finding.clone());
-            same.filter(|own| own.message == *message)
+            same.filter(|mismatch| mismatch.message == *message)
                 .unwrap_or_else(|| Mismatch {
                     span: problem::TextSpan { start: 0, end: 0 },
                     message: message.clone(),
@@ -266,7 +270,7 @@ impl Settled {
     /// Whether it was skipped for a reason that begins with these words.
     pub(super) fn begins_with(&self, words: &str) -> bool {
         let first = self.remarks.first();
-        self.verdict == Verdict::Skipped && first.is_some_and(|own| own.starts_with(words))
+        self.verdict == Verdict::Skipped && first.is_some_and(|remark| remark.starts_with(words))
     }
 
     /// Whether the same came of another attempt at the scenario, whatever time it took.
@@ -360,16 +364,17 @@ fn traces(
 }
 
 fn show(
-    (number, rate): (usize, Rate),
+    number: usize,
     case: &Settled,
     attempt: Option<&Attempt>,
-    (outcome, traces): (&Outcome, &[Trace]),
+    outcome: &Outcome,
+    traces: &[Trace],
     opened: &Opened,
 ) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
     let report = entry
         .as_ref()
-        .map_or_else(|| report_of(traces), |own| own.report);
+        .map_or_else(|| report_of(traces), |entry| entry.report);
     let sources = entry.map_or_else(Vec::new, |entry| {
         let sources = entry.scenario.sources.into_iter();
         sources.map(|source| source.text).collect()
@@ -393,7 +398,7 @@ fn show(
             outcome,
             traces,
             report,
-            rate,
+            rate: opened.rate(),
             again: &again,
         },
     )

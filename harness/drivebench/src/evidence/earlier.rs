@@ -1,5 +1,6 @@
 //! What earlier runs have shown: the verdicts of their folders, which are judged again before anything is left out because of them.
 
+use super::derive::verdict_named;
 use super::error::EvidenceError;
 use super::files::sum;
 use super::merge::{MERGE, opened_parts, verify_merged};
@@ -30,7 +31,7 @@ impl Known {
     /// The verdict of a scenario that need not be played again.
     fn shown(&self) -> Option<Verdict> {
         let done = [Verdict::Passed, Verdict::Marginal];
-        self.verdict.filter(|own| done.contains(own))
+        self.verdict.filter(|verdict| done.contains(verdict))
     }
 
     /// Whether the earlier run is not passed because of it. A skipped scenario does not keep a run from passing.
@@ -82,8 +83,8 @@ fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceErro
         true => (verify_merged(path, None)?.0, opened_parts(path)?),
         false => (verify(path, None)?, vec![Opened::folder(path)?]),
     };
-    for own in &records {
-        fits(own, rig).map_err(refused)?;
+    for record in &records {
+        fits(record, rig).map_err(refused)?;
     }
     if let Some(why) = Verified::first_wrong(&verified) {
         return Err(refused(format!(
@@ -91,14 +92,14 @@ fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceErro
         )));
     }
     let mut scenarios = BTreeMap::new();
-    for own in &records {
-        for (sum, name) in selected(own) {
+    for record in &records {
+        for (sum, name) in selected(record) {
             let verdict = None;
             scenarios.entry(sum).or_insert(Known { name, verdict });
         }
     }
-    for own in &records {
-        for (sum, name, verdict) in own.lines.iter().filter_map(case) {
+    for record in &records {
+        for (sum, name, verdict) in record.lines.iter().filter_map(case) {
             let known = scenarios.entry(sum).or_insert(Known {
                 name: name.clone(),
                 verdict: None,
@@ -114,9 +115,9 @@ fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceErro
 }
 
 /// Whether a record is of a run on this rig, by this program; why not, in a sentence.
-fn fits(own: &Opened, rig: &Rig) -> Result<(), String> {
-    let header = &own.header;
-    let profile = |rig: &Rig| rig.profile.as_ref().map(|own| own.text.clone());
+fn fits(record: &Opened, rig: &Rig) -> Result<(), String> {
+    let header = &record.header;
+    let profile = |rig: &Rig| rig.profile.as_ref().map(|profile| profile.text.clone());
     if header.program != env!("CARGO_PKG_VERSION") {
         return Err(format!(
             "drivebench {} wrote it, and this is {}; play the whole run again",
@@ -127,10 +128,10 @@ fn fits(own: &Opened, rig: &Rig) -> Result<(), String> {
     if header.qualified {
         return Err("it is of `qualify`; a folder of `run --evidence` is expected".to_owned());
     }
-    if own.rig.text != rig.text || profile(&own.rig) != profile(rig) {
+    if record.rig.text != rig.text || profile(&record.rig) != profile(rig) {
         return Err(format!(
             "it is of the rig {} with another file; play the whole run again",
-            own.rig.id()
+            record.rig.id()
         ));
     }
     Ok(())
@@ -138,8 +139,8 @@ fn fits(own: &Opened, rig: &Rig) -> Result<(), String> {
 
 /// The sums and names of the scenarios that were to be played. The record of a run that was killed has no names of those that it did not
 /// come to.
-fn selected(own: &Opened) -> Vec<(String, String)> {
-    match (&own.header.part, &own.header.selected) {
+fn selected(record: &Opened) -> Vec<(String, String)> {
+    match (&record.header.part, &record.header.selected) {
         (Some(part), _) => {
             let all = part.scenarios.iter();
             all.map(|item| (item.sha256.clone(), item.name.clone()))
@@ -165,6 +166,6 @@ fn case(line: &RecordLine) -> Option<(String, String, Verdict)> {
     else {
         return None;
     };
-    let verdict = Verdict::ALL.into_iter().find(|own| own.name() == verdict)?;
+    let verdict = verdict_named(verdict)?;
     Some((sha256.clone()?, name.clone(), verdict))
 }

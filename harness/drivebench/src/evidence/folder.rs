@@ -124,7 +124,8 @@ impl Folder {
         }
         folder.write(VERSIONS, &versions(&started))?;
         let selected = about.selected.iter().map(|text| sum(text.as_bytes()));
-        let names = about.capabilities.iter().map(|own| own.name().to_owned());
+        let capabilities = about.capabilities.iter();
+        let names = capabilities.map(|capability| capability.name().to_owned());
         folder.writer.line(&RecordLine::Run {
             schema: SCHEMA,
             drivebench: env!("CARGO_PKG_VERSION").to_owned(),
@@ -142,8 +143,8 @@ impl Folder {
             selected: Some(selected.collect()),
             part: about.part.map(SplitRun::recorded),
             keep: Some(about.keep)
-                .filter(|own| *own != Keep::All)
-                .map(|own| own.to_string()),
+                .filter(|keep| *keep != Keep::All)
+                .map(|keep| keep.to_string()),
         });
         folder.check()?;
         Ok(folder)

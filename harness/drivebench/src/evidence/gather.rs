@@ -77,11 +77,11 @@ impl<'g> Gathering<'g> {
         })
     }
 
-    /// Takes the scenarios of a part that is there; `own` has their places.
+    /// Takes the scenarios of a part that is there; `places` has their places.
     pub(super) fn part(
         &mut self,
         part: &'g ReadPart,
-        own: &'g [usize],
+        places: &'g [usize],
     ) -> Result<(), EvidenceError> {
         let texts = scenarios(&part.path);
         if let Some(judge) = self.judge.as_mut().filter(|_| !self.parts.is_empty()) {
@@ -92,14 +92,14 @@ impl<'g> Gathering<'g> {
             None => part.opened.judged(&texts)?,
         };
         let behind = self.all.len() + self.played_behind;
-        let number = |at: usize| match own.get(at) {
+        let number = |at: usize| match places.get(at) {
             Some(place) => place + 1,
-            None => behind + at - own.len() + 1,
+            None => behind + at - places.len() + 1,
         };
         let mut made = case_reports(&part.path, &part.opened, &judged, &number)?;
-        let more = made.split_off(own.len().min(made.len()));
+        let more = made.split_off(places.len().min(made.len()));
         let played = made.len();
-        let planned = own.iter().map(|place| &self.all[*place].name);
+        let planned = places.iter().map(|place| &self.all[*place].name);
         let names = made.iter().map(|report| &report.settled.name);
         let qualifies = part.opened.header.qualified;
         if !(more.is_empty() || qualifies)
@@ -111,56 +111,58 @@ impl<'g> Gathering<'g> {
                 part.partition
             )));
         }
-        for (place, report) in own.iter().zip(made) {
+        for (place, report) in places.iter().zip(made) {
             self.rows.insert(*place, report.into());
         }
         self.played_behind += more.len();
-        more.into_iter().for_each(|own| self.behind(own, part));
+        for report in more {
+            self.behind(report, part);
+        }
         let unplayed = selection::compare(&part.opened).missing;
-        let whole = part.has_ended() && played == own.len() && unplayed.is_none();
-        if !part.has_ended() || played < own.len() {
+        let whole = part.has_ended() && played == places.len() && unplayed.is_none();
+        if !part.has_ended() || played < places.len() {
             self.missing.push(format!(
                 "part {} did not come to its end: {} not run",
                 part.partition,
-                counted(own.len() - played, "scenario")
+                counted(places.len() - played, "scenario")
             ));
         } else if let Some(why) = unplayed.filter(|_| qualifies) {
             self.missing.push(format!("part {}: {why}", part.partition));
         }
         self.not_run(
-            &own[played..],
+            &places[played..],
             &format!("part {} ended before it", part.partition),
         );
         self.parts.push(JudgedPart {
             part,
             judged,
-            places: own,
+            places,
             whole,
         });
         Ok(())
     }
 
     /// Takes what a qualification has played behind the selected scenarios. What came of it in a part before is shown once.
-    fn behind(&mut self, mut own: CaseReport, part: &ReadPart) {
+    fn behind(&mut self, mut report: CaseReport, part: &ReadPart) {
         let mut same = self.behind.iter().map(|row| &row.settled);
-        let same = same.find(|row| row.name == own.settled.name);
-        if same.is_some_and(|row| row.says_the_same_as(&own.settled)) {
+        let same = same.find(|row| row.name == report.settled.name);
+        if same.is_some_and(|row| row.says_the_same_as(&report.settled)) {
             return;
         }
         if same.is_some() {
-            own.name_part(&part.partition.to_string());
+            report.name_part(&part.partition.to_string());
         }
-        self.behind.push(own.into());
+        self.behind.push(report.into());
     }
 
     /// Takes the scenarios of a part that is not there. A part without any is not missed.
-    pub(super) fn no_part(&mut self, partition: Partition, own: &[usize]) {
-        if !own.is_empty() {
-            let count = counted(own.len(), "scenario");
+    pub(super) fn no_part(&mut self, partition: Partition, places: &[usize]) {
+        if !places.is_empty() {
+            let count = counted(places.len(), "scenario");
             self.missing
                 .push(format!("part {partition} is missing: {count} not run"));
         }
-        self.not_run(own, &format!("part {partition} is missing"));
+        self.not_run(places, &format!("part {partition} is missing"));
     }
 
     fn not_run(&mut self, places: &[usize], why: &str) {
@@ -184,20 +186,21 @@ impl<'g> Gathering<'g> {
             return Ok(None);
         };
         let mut parts = Vec::new();
-        for own in &self.parts {
-            let name = own.part.partition.to_string();
+        for part in &self.parts {
+            let name = part.part.partition.to_string();
             let wrong = |why| EvidenceError::Merge(format!("part {name}: {why}"));
-            let mut left = cases(&own.part.opened, &own.judged).map_err(wrong)?;
-            let selected = left.drain(..own.places.len().min(left.len()));
-            let places = own.places.iter().copied();
+            let mut left = cases(&part.part.opened, &part.judged).map_err(wrong)?;
+            let selected = left.drain(..part.places.len().min(left.len()));
+            let places = part.places.iter().copied();
             parts.push(RecordedPart {
                 selected: places.zip(selected).collect(),
                 cases: left,
-                whole: own.whole,
+                whole: part.whole,
                 name,
             });
         }
-        let began = self.parts.iter().map(|own| &own.part.opened.header.started);
+        let parts_there = self.parts.iter();
+        let began = parts_there.map(|part| &part.part.opened.header.started);
         let began = began.min().map_or("", String::as_str);
         let missing = &self.missing;
         let made = judge.qualified(began, QualificationRecord::Parts { parts, missing });

@@ -85,18 +85,18 @@ pub(super) fn header(
     };
     wrong.extend(
         part.iter()
-            .flat_map(|own| part::differences(own, selected.as_ref())),
+            .flat_map(|part| part::differences(part, selected.as_ref())),
     );
     if *rig_sha256 != sum(rig.text.as_bytes()) {
         wrong.push(format!("{RIG} is not the file that was used"));
     }
     rings(drives)?;
-    let own = rig.sizes();
-    if own != *drives {
+    let drives_of_rig = rig.sizes();
+    if drives_of_rig != *drives {
         return Err(format!(
             "the sizes of the record's rings are {}, and those of {RIG} are {}",
             sizes(drives),
-            sizes(&own)
+            sizes(&drives_of_rig)
         ));
     }
     let of_rings = bus_of(rig).carries == Carries::Link;
@@ -134,7 +134,8 @@ pub(super) fn header(
         simulated.to_string(),
         rig.is_simulated().to_string(),
     );
-    let listed: Vec<_> = expected.capabilities.iter().map(|own| own.name()).collect();
+    let listed = expected.capabilities.iter().copied();
+    let listed: Vec<_> = listed.map(Capability::name).collect();
     must(
         "the list of capabilities",
         names.join(", "),

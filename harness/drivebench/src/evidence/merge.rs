@@ -73,16 +73,16 @@ pub fn merge(parts: &[PathBuf], output: &Path) -> Result<Merged, EvidenceError> 
         return Err(EvidenceError::NotEmpty(output.display().to_string()));
     }
     let all = read(parts)?;
-    for own in &all {
-        let path = own.path.display();
-        let program = &own.opened.header.program;
+    for part in &all {
+        let path = part.path.display();
+        let program = &part.opened.header.program;
         if program != env!("CARGO_PKG_VERSION") {
             return Err(EvidenceError::Merge(format!(
                 "drivebench {program} wrote {path}, and this is {}; merge with the version that played the parts",
                 env!("CARGO_PKG_VERSION")
             )));
         }
-        let verified = verify(&own.path, None)?;
+        let verified = verify(&part.path, None)?;
         if let Some(why) = verified.first_wrong() {
             return Err(EvidenceError::Merge(format!(
                 "{path} is not what its record gives: {why}; `drivebench verify {path}` shows all of it"
@@ -91,17 +91,17 @@ pub fn merge(parts: &[PathBuf], output: &Path) -> Result<Merged, EvidenceError> 
     }
     let whole = |path: &Path| std::path::absolute(path).map_err(failed(path));
     let into = whole(output)?;
-    for own in &all {
-        if into.starts_with(whole(&own.path)?) {
+    for part in &all {
+        if into.starts_with(whole(&part.path)?) {
             return Err(EvidenceError::Merge(format!(
                 "{} lies in {}, which must stay as it is; name another folder",
                 output.display(),
-                own.path.display()
+                part.path.display()
             )));
         }
     }
-    for own in &all {
-        copy(&own.path, &place(output, own.partition.number))?;
+    for part in &all {
+        copy(&part.path, &place(output, part.partition.number))?;
     }
     let made = make(output)?;
     let texts = [
@@ -111,8 +111,8 @@ pub fn merge(parts: &[PathBuf], output: &Path) -> Result<Merged, EvidenceError> 
         (MERGE, &made.record),
     ];
     let qualified = made.qualified.as_ref();
-    let found = qualified.map(|own| (DEVIATIONS, &own.deviations));
-    let profile = qualified.and_then(|own| Some((PROFILE, own.profile.as_ref()?)));
+    let found = qualified.map(|qualified| (DEVIATIONS, &qualified.deviations));
+    let profile = qualified.and_then(|qualified| Some((PROFILE, qualified.profile.as_ref()?)));
     for (name, text) in texts.into_iter().chain(found).chain(profile) {
         let path = output.join(name);
         regular::write_text(&path, text).map_err(failed(&path))?;
@@ -138,12 +138,12 @@ pub fn verify_merged(
     };
     let mut unconfirmed = BTreeSet::new();
     for number in &made.merged.parts.0 {
-        let own = verify(&place(path, *number), signer)?;
+        let part = verify(&place(path, *number), signer)?;
         let named = |what: String| format!("{PARTS}/{number}: {what}");
-        verified.files.extend(own.files.into_iter().map(named));
-        verified.attempts.extend(own.attempts);
-        verified.complete &= own.complete;
-        unconfirmed.extend(own.unconfirmed);
+        verified.files.extend(part.files.into_iter().map(named));
+        verified.attempts.extend(part.attempts);
+        verified.complete &= part.complete;
+        unconfirmed.extend(part.unconfirmed);
     }
     verified.unconfirmed.extend(unconfirmed);
     verified
@@ -159,8 +159,9 @@ pub fn verify_merged(
             file(path, PAGE, |_| made.page.clone()),
         ];
         verified.files.extend(wrong.into_iter().flatten());
-        let wrong = made.qualified.iter().flat_map(|own| compare(path, own));
-        verified.files.extend(wrong);
+        if let Some(qualified) = &made.qualified {
+            verified.files.extend(compare(path, qualified));
+        }
     }
     let of_qualification = [PROFILE, DEVIATIONS];
     for name in entries(path)? {
@@ -195,7 +196,8 @@ pub(super) fn opened_parts(path: &Path) -> Result<Vec<Opened>, EvidenceError> {
 
 /// What a qualification found, as the page shows it.
 fn found(qualified: &Qualified) -> Vec<(&'static str, String)> {
-    let profile = qualified.profile.clone().map(|own| (PROFILE_HEADING, own));
+    let profile = qualified.profile.clone();
+    let profile = profile.map(|profile| (PROFILE_HEADING, profile));
     let deviations = (DEVIATIONS_HEADING, qualified.deviations.clone());
     std::iter::once(deviations).chain(profile).collect()
 }
@@ -205,22 +207,23 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
     let parts = parts_of(path)?;
     let first = &parts[0];
     let (rig, all, of) = (first.opened.rig.id(), first.scenarios(), first.partition.of);
-    let mut places: BTreeMap<u32, Vec<usize>> = (1..=of).map(|own| (own, Vec::new())).collect();
+    let mut places: BTreeMap<u32, Vec<usize>> =
+        (1..=of).map(|number| (number, Vec::new())).collect();
     for (place, item) in all.iter().enumerate() {
         let owner = first.partition.owner(place, &item.name);
         places.entry(owner).or_default().push(place);
     }
     let mut gathering = Gathering::of(path, first)?;
-    for (number, own) in &places {
+    for (number, scenarios) in &places {
         let place = parts.binary_search_by_key(number, |part| part.partition.number);
         match place {
-            Ok(place) => gathering.part(&parts[place], own)?,
+            Ok(place) => gathering.part(&parts[place], scenarios)?,
             Err(_) => gathering.no_part(
                 Partition {
                     number: *number,
                     ..first.partition
                 },
-                own,
+                scenarios,
             ),
         }
     }
@@ -236,18 +239,18 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
     let merged = Merged {
         took: rows
             .values()
-            .fold(Span::ZERO, |sum, own| sum + own.settled.took),
+            .fold(Span::ZERO, |sum, row| sum + row.settled.took),
         verdicts: rows
             .values()
-            .map(|own| (own.settled.name.clone(), own.settled.verdict))
+            .map(|row| (row.settled.name.clone(), row.settled.verdict))
             .collect(),
-        parts: (parts.iter().map(|own| own.partition.number).collect(), of),
+        parts: (parts.iter().map(|part| part.partition.number).collect(), of),
         missing,
         named_denied: rows.iter().any(denied),
         safe: !parts.iter().any(ReadPart::is_unsafe),
         deviations: qualified
             .as_ref()
-            .map(|own| (own.deviations.clone(), own.verdict)),
+            .map(|qualified| (qualified.deviations.clone(), qualified.verdict)),
     };
     let head = Head {
         found: qualified.as_ref().map_or_else(Vec::new, found),
@@ -281,14 +284,15 @@ fn facts(merged: &Merged, first: &ReadPart) -> Vec<(&'static str, String)> {
         ),
         ("Parts", format!("{} of {of}", there.len())),
     ];
-    facts.extend(merged.missing.iter().map(|own| ("Incomplete", own.clone())));
+    let missing = merged.missing.iter();
+    facts.extend(missing.map(|reason| ("Incomplete", reason.clone())));
     facts
 }
 
 fn record(merged: &Merged, parts: &[ReadPart]) -> String {
-    let of_part = |own: &ReadPart| {
-        let sums = files::read(&own.path, SUMS).ok().map(|bytes| sum(&bytes));
-        serde_json::json!({ "part": own.partition.to_string(), "folder": format!("{PARTS}/{}", own.partition.number), "sums_sha256": sums })
+    let of_part = |part: &ReadPart| {
+        let sums = files::read(&part.path, SUMS).ok().map(|bytes| sum(&bytes));
+        serde_json::json!({ "part": part.partition.to_string(), "folder": format!("{PARTS}/{}", part.partition.number), "sums_sha256": sums })
     };
     let cases = merged.verdicts.iter();
     let cases =
@@ -296,7 +300,7 @@ fn record(merged: &Merged, parts: &[ReadPart]) -> String {
     let fingerprint: serde_json::Map<_, _> = parts[0]
         .fingerprint()
         .into_iter()
-        .map(|(what, own)| (what.replace(' ', "_"), own.into()))
+        .map(|(what, value)| (what.replace(' ', "_"), value.into()))
         .collect();
     let value = serde_json::json!({
         "schema": 1,

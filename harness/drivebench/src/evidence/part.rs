@@ -45,15 +45,16 @@ impl SplitRun {
     #[must_use]
     pub fn share(&self, entries: Vec<Entry>) -> Vec<Entry> {
         let all = entries.into_iter().zip(&self.scenarios).enumerate();
-        let share = all.filter(|(place, (_, own))| self.partition.has(*place, &own.name));
+        let share = all.filter(|(place, (_, planned))| self.partition.has(*place, &planned.name));
         share.map(|(_, (entry, _))| entry).collect()
     }
 
     /// The names of its scenarios in the folder.
     pub(super) fn names(&self) -> Names {
-        let own = own(self.partition, &self.scenarios);
-        let all: BTreeSet<_> = self.scenarios.iter().map(|own| own.name.clone()).collect();
-        Names::planned(own.map(|item| item.name.clone()).collect(), all)
+        let of_part = of_part(self.partition, &self.scenarios);
+        let name = |planned: &PartItem| planned.name.clone();
+        let all: BTreeSet<_> = self.scenarios.iter().map(name).collect();
+        Names::planned(of_part.map(name).collect(), all)
     }
 
     /// What the record says of it.
@@ -68,17 +69,17 @@ impl SplitRun {
 }
 
 /// The scenarios of a part, in order.
-fn own(partition: Partition, all: &[PartItem]) -> impl Iterator<Item = &PartItem> {
+fn of_part(partition: Partition, all: &[PartItem]) -> impl Iterator<Item = &PartItem> {
     let all = all.iter().enumerate();
-    all.filter(move |(place, own)| partition.has(*place, &own.name))
-        .map(|(_, own)| own)
+    all.filter(move |(place, planned)| partition.has(*place, &planned.name))
+        .map(|(_, planned)| planned)
 }
 
 /// The sum of all names and texts.
 fn digest(all: &[PartItem]) -> String {
-    let lines = all.iter().map(|own| {
-        let named = if own.named { "  named" } else { "" };
-        format!("{}  {}{named}\n", own.sha256, own.name)
+    let lines = all.iter().map(|planned| {
+        let named = if planned.named { "  named" } else { "" };
+        format!("{}  {}{named}\n", planned.sha256, planned.name)
     });
     sum(lines.collect::<String>().as_bytes())
 }
@@ -101,8 +102,8 @@ pub(super) fn differences(part: &RunPart, selected: Option<&Vec<String>>) -> Vec
         wrong
             .push("run.jsonl, line 1: `corpus` is not the sum of the list of scenarios".to_owned());
     }
-    let own = own(partition, &part.scenarios).map(|item| &item.sha256);
-    if !own.eq(selected.into_iter().flatten()) {
+    let of_part = of_part(partition, &part.scenarios).map(|item| &item.sha256);
+    if !of_part.eq(selected.into_iter().flatten()) {
         wrong.push(format!(
             "run.jsonl, line 1: the selected scenarios are not those of {partition} of the list"
         ));

@@ -1,5 +1,6 @@
 //! The files of a qualification, made again from its record.
 
+use super::derive::verdict_named;
 use super::files::{DEVIATIONS, PROFILE, read_text};
 use super::record::RecordLine;
 use super::selection;
@@ -76,7 +77,7 @@ fn difference(path: &Path, file: &str, made: &str) -> Option<String> {
     let (stated, made): (Vec<_>, Vec<_>) =
         (stated.split('\n').collect(), made.split('\n').collect());
     let lines = stated.iter().zip(&made);
-    let same = lines.take_while(|(own, other)| own == other).count();
+    let same = lines.take_while(|(stated, made)| stated == made).count();
     let shown = |lines: &[&str]| match lines.get(same) {
         Some(line) => format!("\"{line}\""),
         None => "no such line".to_owned(),
@@ -107,9 +108,9 @@ pub(super) fn cases(
                 sha256,
                 ..
             } => {
-                let (own, rest) = left.split_at(pending.min(left.len()));
+                let (judged, rest) = left.split_at(pending.min(left.len()));
                 (left, pending) = (rest, 0);
-                let attempts: Option<Vec<Attempt>> = own.iter().map(Judged::attempt).collect();
+                let attempts: Option<Vec<Attempt>> = judged.iter().map(Judged::attempt).collect();
                 let attempts = attempts
                     .ok_or_else(|| format!("case {name}: an attempt cannot be judged again"))?;
                 let played = match attempts.is_empty() {
@@ -120,7 +121,7 @@ pub(super) fn cases(
                     name: name.clone(),
                     sum: sha256.clone().unwrap_or_default(),
                     played,
-                    ends_the_run: own.iter().any(Judged::ends_the_run),
+                    ends_the_run: judged.iter().any(Judged::ends_the_run),
                 });
             }
             _ => {}
@@ -130,7 +131,7 @@ pub(super) fn cases(
 }
 
 fn not_played(verdict: &str, remarks: &[String]) -> PlayedScenario {
-    let verdict = Verdict::ALL.into_iter().find(|own| own.name() == verdict);
+    let verdict = verdict_named(verdict);
     PlayedScenario {
         outcome: Outcome {
             verdict: verdict.unwrap_or(Verdict::Skipped),

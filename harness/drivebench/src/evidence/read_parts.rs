@@ -4,6 +4,7 @@ use super::error::EvidenceError;
 use super::files::{self, CAPTURES, SCENARIOS, SIGNATURE, SUMS, sum};
 use super::record::{PartItem, RecordLine};
 use super::verify::Opened;
+use crate::link::Capability;
 use crate::partition::Partition;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,13 +71,13 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> 
                 path.display()
             )));
         };
-        let own = ReadPart {
+        let part = ReadPart {
             path: path.clone(),
             partition,
             opened,
         };
         if let Some(first) = parts.first() {
-            own.is_of_one_run_with(first)?;
+            part.is_of_one_run_with(first)?;
         }
         if let Some(other) = parts.iter().find(|other| other.partition == partition) {
             return Err(EvidenceError::Merge(format!(
@@ -85,9 +86,9 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> 
                 path.display()
             )));
         }
-        parts.push(own);
+        parts.push(part);
     }
-    parts.sort_by_key(|own| own.partition.number);
+    parts.sort_by_key(|part| part.partition.number);
     match parts.is_empty() {
         true => Err(EvidenceError::Merge("there is no part".to_owned())),
         false => Ok(parts),
@@ -99,7 +100,8 @@ impl ReadPart {
     pub(super) fn fingerprint(&self) -> Vec<(&'static str, String)> {
         let header = &self.opened.header;
         let part = header.part.as_ref();
-        let names: Vec<_> = header.capabilities.iter().map(|own| own.name()).collect();
+        let names = header.capabilities.iter().copied();
+        let names: Vec<_> = names.map(Capability::name).collect();
         vec![
             ("version of drivebench", header.program.clone()),
             ("schema", header.schema.to_string()),
@@ -116,12 +118,12 @@ impl ReadPart {
             ),
             (
                 "filter",
-                part.and_then(|own| own.filter.clone())
+                part.and_then(|part| part.filter.clone())
                     .unwrap_or_else(|| "none".to_owned()),
             ),
             (
                 "corpus",
-                part.map_or_else(String::new, |own| own.corpus.clone()),
+                part.map_or_else(String::new, |part| part.corpus.clone()),
             ),
             ("list of capabilities", names.join(", ")),
             ("rate", header.rate.bits_per_second().to_string()),
@@ -139,18 +141,18 @@ impl ReadPart {
                     .rig
                     .profile
                     .as_ref()
-                    .map_or_else(|| "none".to_owned(), |own| sum(own.text.as_bytes())),
+                    .map_or_else(|| "none".to_owned(), |profile| sum(profile.text.as_bytes())),
             ),
         ]
     }
 
     fn is_of_one_run_with(&self, first: &Self) -> Result<(), EvidenceError> {
         let both = first.fingerprint().into_iter().zip(self.fingerprint());
-        let mut differing = both.filter(|((_, theirs), (_, own))| theirs != own);
+        let mut differing = both.filter(|((_, theirs), (_, ours))| theirs != ours);
         match differing.next() {
             None => Ok(()),
-            Some(((what, theirs), (_, own))) => Err(EvidenceError::Merge(format!(
-                "{} and {} are no parts of one run: the {what} is {theirs} in the first and {own} in the second",
+            Some(((what, theirs), (_, ours))) => Err(EvidenceError::Merge(format!(
+                "{} and {} are no parts of one run: the {what} is {theirs} in the first and {ours} in the second",
                 first.path.display(),
                 self.path.display()
             ))),
@@ -163,7 +165,7 @@ impl ReadPart {
             .header
             .part
             .as_ref()
-            .map_or(&[], |own| &own.scenarios)
+            .map_or(&[], |part| &part.scenarios)
     }
 }
 
@@ -187,20 +189,20 @@ pub(super) fn parts_of(path: &Path) -> Result<Vec<ReadPart>, EvidenceError> {
     is_folder(&folder)?;
     let names = entries(&folder)?;
     let all: Vec<_> = names.iter().map(|name| folder.join(name)).collect();
-    for own in &all {
-        is_folder(own)?;
+    for folder in &all {
+        is_folder(folder)?;
     }
     let parts = read(&all)?;
     match parts
         .iter()
-        .find(|own| place(path, own.partition.number) != own.path)
+        .find(|part| place(path, part.partition.number) != part.path)
     {
         None => Ok(parts),
-        Some(own) => Err(EvidenceError::Merge(format!(
+        Some(part) => Err(EvidenceError::Merge(format!(
             "{} holds {}, which belongs into {PARTS}/{}",
-            own.path.display(),
-            own.partition,
-            own.partition.number
+            part.path.display(),
+            part.partition,
+            part.partition.number
         ))),
     }
 }

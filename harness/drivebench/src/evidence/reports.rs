@@ -36,8 +36,8 @@ pub(super) fn differences(
         moved(&made.junit, path, stated, SCENARIOS)
     }));
     wrong.extend(versions(path, opened));
-    for own in judged {
-        wrong.extend(of_attempt(path, opened, own));
+    for attempt in judged {
+        wrong.extend(of_attempt(path, opened, attempt));
     }
     wrong.extend(foreign(path, opened, judged));
     wrong
@@ -59,7 +59,7 @@ pub(super) fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -
         return None;
     }
     let lines = stated.lines().zip(made.lines());
-    let same = lines.take_while(|(own, other)| own == other).count();
+    let same = lines.take_while(|(stated, made)| stated == made).count();
     Some(format!(
         "{name}, line {}: the record gives another text",
         same + 1
@@ -69,12 +69,12 @@ pub(super) fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -
 /// JUnit's output names files by the path that the folder had during the run; everything else follows from the record.
 /// `inner` is the folder in it that each such path leads through.
 pub(super) fn moved(made: &str, path: &Path, stated: &str, inner: &str) -> String {
-    let own = |text: &str| {
+    let folder = |text: &str| {
         let from = text.find(ATTACHMENT)? + ATTACHMENT.len();
         let end = from + text[from..].find(&format!("/{inner}/"))?;
         Some(text[from..end].to_owned())
     };
-    match (own(made), own(stated)) {
+    match (folder(made), folder(stated)) {
         (Some(here), Some(there)) => made.replace(
             &format!("{ATTACHMENT}{here}/"),
             &format!("{ATTACHMENT}{there}/"),
@@ -107,11 +107,11 @@ fn versions(path: &Path, opened: &Opened) -> Option<String> {
 }
 
 /// The capture of an attempt.
-fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> {
-    let (_, again) = own.again.as_ref().ok()?;
+fn of_attempt(path: &Path, opened: &Opened, attempt: &Judged<'_>) -> Option<String> {
+    let (_, again) = attempt.again.as_ref().ok()?;
     let name = format!(
         "{CAPTURES}/{}.{}.json",
-        own.recorded.name, own.recorded.attempt
+        attempt.recorded.name, attempt.recorded.attempt
     );
     if opened.left_out.contains(&name) {
         return None;
@@ -130,7 +130,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> 
     if !opened.header.of_rings {
         // An adapter may stamp a frame before the conversation began, where a capture has no place for its first bit.
         let looks = !opened.rig.file.interlock.is_empty();
-        let differs = frames_differ(own.recorded, &capture_read.traces, looks)?;
+        let differs = frames_differ(attempt.recorded, &capture_read.traces, looks)?;
         return Some(format!("{name}: {differs}"));
     }
     if capture(&capture_read.traces, &again.attempt.outcome) != text {
@@ -141,7 +141,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> 
     if opened.header.simulated || !opened.rig.file.interlock.is_empty() {
         return None;
     }
-    let ends = Ends::of(own.recorded, opened);
+    let ends = Ends::of(attempt.recorded, opened);
     let differs = ends.differ(&capture_read.traces)?;
     Some(format!("{name}: {differs}"))
 }
@@ -152,8 +152,8 @@ fn played(recorded: &Recorded) -> &[LinkEvent] {
         .events
         .split(|event| matches!(event, LinkEvent::Begin(_)));
     let conversations: Vec<_> = conversations.collect();
-    let has_steps =
-        |own: &&&[LinkEvent]| own.iter().any(|event| matches!(event, LinkEvent::Step(_)));
+    let is_step = |event: &LinkEvent| matches!(event, LinkEvent::Step(_));
+    let has_steps = |conversation: &&&[LinkEvent]| conversation.iter().any(is_step);
     let played = conversations
         .iter()
         .find(has_steps)
@@ -168,7 +168,7 @@ fn frames_differ(recorded: &Recorded, traces: &[Trace], looks: bool) -> Option<S
         return Some("it has more than one bus".to_owned());
     };
     let carried = trace.channels.iter().flat_map(Channel::frames);
-    let (own, others): (Vec<&LineFrame>, Vec<&LineFrame>) =
+    let (bench_frames, others): (Vec<&LineFrame>, Vec<&LineFrame>) =
         carried.partition(|frame| frame.from.is_none());
     let mut sent = Vec::new();
     let mut received = Vec::new();
@@ -181,18 +181,19 @@ fn frames_differ(recorded: &Recorded, traces: &[Trace], looks: bool) -> Option<S
             _ => {}
         }
     }
-    let own: Vec<_> = own.iter().map(|own| own.frame).collect();
+    let bench_frames: Vec<_> = bench_frames.iter().map(|frame| frame.frame).collect();
     let others: Vec<_> = others
         .iter()
-        .filter(|own| own.ended == FrameEnd::Good)
-        .map(|own| (own.at.since_start().as_nanos(), own.frame))
+        .filter(|frame| frame.ended == FrameEnd::Good)
+        .map(|frame| (frame.at.since_start().as_nanos(), frame.frame))
         .collect();
     if looks {
         let mut others = others.iter();
-        let shown = received.iter().all(|own| others.any(|other| other == own));
-        return (!shown).then(|| "the frames of the drives are not those of the record".to_owned());
+        let shown = |frame| others.any(|other| other == frame);
+        return (!received.iter().all(shown))
+            .then(|| "the frames of the drives are not those of the record".to_owned());
     }
-    if !sent.starts_with(&own) {
+    if !sent.starts_with(&bench_frames) {
         return Some("the frames of the bench are not those of the record".to_owned());
     }
     (!others.starts_with(&received))
@@ -253,13 +254,13 @@ impl Ends {
 
     fn carry(&mut self, ring: usize, end: usize, at: Instant, byte: Received) {
         let at = at.since_start().as_nanos();
-        let link = self.rings.get_mut(ring).and_then(|own| own[end].as_mut());
+        let link = self.rings.get_mut(ring).and_then(|ends| ends[end].as_mut());
         link.into_iter().for_each(|bytes| bytes.push((at, byte)));
     }
 
     fn forget(&mut self, ring: usize, end: usize) {
-        if let Some(own) = self.rings.get_mut(ring) {
-            own[end] = None;
+        if let Some(ends) = self.rings.get_mut(ring) {
+            ends[end] = None;
         }
     }
 
@@ -267,9 +268,9 @@ impl Ends {
         if traces.len() != self.rings.len() {
             return Some("it has another number of rings than the rig".to_owned());
         }
-        for (own, trace) in self.rings.iter().zip(traces) {
+        for (ends, trace) in self.rings.iter().zip(traces) {
             let links = [trace.channels.first(), trace.channels.last()];
-            for ((expected, link), name) in own.iter().zip(links).zip(["outgoing", "incoming"]) {
+            for ((expected, link), name) in ends.iter().zip(links).zip(["outgoing", "incoming"]) {
                 let carried = |link: &Channel| -> Vec<Carried> {
                     let arrived = link.octets().iter().filter_map(|byte| {
                         Some((byte.at.since_start().as_nanos(), byte.arrival()?))
@@ -294,7 +295,7 @@ impl Ends {
 /// Files that no run leaves.
 fn foreign(path: &Path, opened: &Opened, judged: &[Judged<'_>]) -> Vec<String> {
     let fixed = [RECORD, RIG, JUNIT, REPORT, PAGE, VERSIONS, SUMS];
-    let mut known: BTreeSet<String> = fixed.iter().map(|own| (*own).to_owned()).collect();
+    let mut known: BTreeSet<String> = fixed.iter().map(|name| (*name).to_owned()).collect();
     known.extend(
         opened
             .rig
@@ -305,8 +306,8 @@ fn foreign(path: &Path, opened: &Opened, judged: &[Judged<'_>]) -> Vec<String> {
     if opened.header.qualified {
         known.extend([PROFILE, DEVIATIONS].map(str::to_owned));
     }
-    for own in judged {
-        let Recorded { name, attempt, .. } = &own.recorded;
+    for judged_attempt in judged {
+        let Recorded { name, attempt, .. } = &judged_attempt.recorded;
         known.insert(format!("{CAPTURES}/{name}.{attempt}.json"));
     }
     for line in &opened.lines {

@@ -41,17 +41,18 @@ pub(super) fn rerun(
     };
     let mut wrong = Vec::new();
     let mut attempts = opened.attempts.iter();
-    let mut own = Vec::new();
+    let mut lines = Vec::new();
     for line in &opened.lines[1..] {
-        own.push(line.clone());
+        lines.push(line.clone());
         match line {
             RecordLine::Scenario { .. } => {
-                let events = attempts.next().into_iter().flat_map(|own| &own.events);
-                own.extend(events.filter_map(RecordLine::of));
+                let attempt = attempts.next().into_iter();
+                let events = attempt.flat_map(|attempt| &attempt.events);
+                lines.extend(events.filter_map(RecordLine::of));
             }
             RecordLine::Case { .. } => {
-                let own = std::mem::take(&mut own);
-                match scenario(&mut *run, path, opened, &own, texts) {
+                let lines = std::mem::take(&mut lines);
+                match scenario(&mut *run, path, opened, &lines, texts) {
                     Ok(differs) => wrong.extend(differs),
                     Err(why) => {
                         wrong.push(why);

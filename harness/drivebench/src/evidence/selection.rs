@@ -27,7 +27,7 @@ pub(super) fn compare(opened: &Opened) -> Selection {
     let pairs = selected.iter().zip(&cases);
     for (number, (_, (name, _))) in (1..)
         .zip(pairs)
-        .filter(|(_, (own, (_, case)))| *own != case)
+        .filter(|(_, (sum, (_, case)))| *sum != case)
     {
         selection.wrong.push(format!(
             "case {name}: the scenario that was selected as number {number} is another one"
@@ -45,8 +45,9 @@ pub(super) fn compare(opened: &Opened) -> Selection {
     let judge = opened.judge().ok().flatten();
     let judge = judge.filter(|_| header.qualified);
     let qualifying = judge.as_deref().map(qualifying).unwrap_or_default();
-    let known = |sum: &String| qualifying.iter().any(|own| own.sum == *sum);
-    let trial = |name: &str| judge.as_ref().is_some_and(|own| own.is_trial(name));
+    let sums: Vec<_> = qualifying.iter().map(|known| &known.sum).collect();
+    let known = |sum: &String| sums.contains(&sum);
+    let trial = |name: &str| judge.as_ref().is_some_and(|judge| judge.is_trial(name));
     let unknown = more
         .iter()
         .filter(|(name, sum)| !known(sum) && !trial(name));
@@ -55,10 +56,10 @@ pub(super) fn compare(opened: &Opened) -> Selection {
             .wrong
             .push(format!("case {name}: it was not selected"));
     }
-    let played = |own: &String| more.iter().any(|(_, sum)| sum == own);
+    let played = |sum: &String| more.iter().any(|(_, other)| other == sum);
     let left = qualifying
         .iter()
-        .filter(|own| own.always && !played(&own.sum));
+        .filter(|conversation| conversation.always && !played(&conversation.sum));
     let left: Vec<_> = left.collect();
     if let [first, others @ ..] = &left[..] {
         let first = &first.name;
@@ -92,10 +93,10 @@ struct Qualifying {
 
 fn qualifying(judge: &dyn RecordJudge) -> Vec<Qualifying> {
     let all = judge.conversations().into_iter();
-    let listed = all.map(|own| Qualifying {
-        sum: sum(own.source.text.as_bytes()),
-        name: own.source.name,
-        always: own.always,
+    let listed = all.map(|conversation| Qualifying {
+        sum: sum(conversation.source.text.as_bytes()),
+        name: conversation.source.name,
+        always: conversation.always,
     });
     listed.collect()
 }

@@ -71,7 +71,7 @@ impl Verified {
     #[must_use]
     pub fn first_wrong(&self) -> Option<&String> {
         let attempts = self.attempts.iter();
-        let differs = attempts.filter_map(|own| own.differs.as_ref());
+        let differs = attempts.filter_map(|attempt| attempt.differs.as_ref());
         self.files.iter().chain(differs).next()
     }
 }
@@ -312,7 +312,9 @@ impl Opened {
     fn is_ended(&self, judged: &[Judged<'_>]) -> bool {
         self.whole
             && matches!(self.lines.last(), Some(RecordLine::End { .. }))
-            && judged.iter().all(|own| own.recorded.verdict.is_some())
+            && judged
+                .iter()
+                .all(|attempt| attempt.recorded.verdict.is_some())
     }
 
     /// What the record is worth.
@@ -412,12 +414,12 @@ pub(super) fn text_of(
 
 impl Judged<'_> {
     fn finding(&self) -> Rejudged {
-        let own = self.recorded.verdict.as_ref();
-        let unused = own.into_iter().flat_map(Recalled::unused);
+        let verdict = self.recorded.verdict.as_ref();
+        let unused = verdict.into_iter().flat_map(Recalled::unused);
         let judged = self.again.as_ref();
         Rejudged {
             name: self.recorded.title(),
-            recorded: own.map(|own| own.verdict.clone()),
+            recorded: verdict.map(|verdict| verdict.verdict.clone()),
             judged: judged
                 .map_or("aborted", |(_, again)| again.attempt.outcome.verdict.name())
                 .to_owned(),

@@ -156,13 +156,13 @@ fn keys(notes: &mut Notebook<'_>, table: &str, value: &toml::Value) {
         toml::Value::Table(inner) => {
             for (key, value) in inner {
                 // A name that the file gives is any name.
-                let own = if table.is_empty() || !free(table) {
+                let name = if table.is_empty() || !free(table) {
                     key.as_str()
                 } else {
                     "NAME"
                 };
                 let dot = if table.is_empty() { "" } else { "." };
-                keys(notes, &format!("{table}{dot}{own}"), value);
+                keys(notes, &format!("{table}{dot}{name}"), value);
             }
         }
         toml::Value::Array(items) if items.iter().any(toml::Value::is_table) => {

@@ -82,7 +82,7 @@ impl Entry {
     #[must_use]
     pub fn rate(&self) -> Rate {
         let rings = self.settled.rings();
-        rings.map(|own| own.rate).unwrap_or_default()
+        rings.map(|rings| rings.rate).unwrap_or_default()
     }
 
     /// Whether the text occurs in the name, the title or a source.

@@ -91,7 +91,7 @@ impl FromStr for TapAt {
                 port,
             });
         }
-        let good = |own: char| own.is_ascii_alphanumeric() || "-_".contains(own);
+        let good = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
         // Interfaces of captures with the name of a station carry what it sends alone.
         if name.is_empty() || name == "master" || !name.chars().all(good) {
             return Err(wrong());
@@ -121,7 +121,7 @@ fn rate(port: &str) -> Result<(&str, u32), String> {
         return Ok((port, 500_000));
     };
     let number: Option<f64> = rate.parse().ok();
-    let number = number.filter(|own| (1.0..=1_500.0).contains(own));
+    let number = number.filter(|rate| (1.0..=1_500.0).contains(rate));
     let number =
         number.ok_or_else(|| format!("`{rate}` is no rate; kbit/s are expected, as in @500"))?;
     Ok((port, (number * 1_000.0).round() as u32))
@@ -130,13 +130,14 @@ fn rate(port: &str) -> Result<(&str, u32), String> {
 /// The format of a line that stations share, by its rate.
 fn line_format(bits: u32) -> Result<Format, String> {
     let formats = line_formats(true);
-    let own = formats.iter().find(|own| own.bits_per_second == bits);
-    own.copied().ok_or_else(|| {
-        let mut rates: Vec<_> = formats.iter().map(|own| own.bits_per_second).collect();
+    let format = formats.iter().find(|format| format.bits_per_second == bits);
+    format.copied().ok_or_else(|| {
+        let rates = formats.iter().map(|format| format.bits_per_second);
+        let mut rates: Vec<_> = rates.collect();
         rates.sort_unstable();
         let rates: Vec<_> = rates
             .iter()
-            .map(|own| (f64::from(*own) / 1_000.0).to_string())
+            .map(|rate| (f64::from(*rate) / 1_000.0).to_string())
             .collect();
         let bits = f64::from(bits) / 1_000.0;
         format!(

@@ -44,7 +44,7 @@ impl<'a> Session<'a> {
         arguments: &'a CaptureArguments,
         stop: &Arc<AtomicBool>,
     ) -> Result<Self, (Exit, String)> {
-        let names = arguments.tap.iter().map(|own| &own.name);
+        let names = arguments.tap.iter().map(|tap| &tap.name);
         let twice = names
             .clone()
             .enumerate()
@@ -62,12 +62,12 @@ impl<'a> Session<'a> {
         let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let wall = wall.unwrap_or_default().as_nanos();
         let wall = u64::try_from(wall).unwrap_or(0);
-        let places: Vec<RecordedPlace> = taps.iter().map(|own| own.place.clone()).collect();
-        let nanos = |own: Duration| u64::try_from(own.as_nanos()).unwrap_or(u64::MAX);
+        let places: Vec<RecordedPlace> = taps.iter().map(|tap| tap.place.clone()).collect();
+        let nanos = |duration: Duration| u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
         let rotation = Rotation {
             size: arguments.size,
             every: arguments.every.map(nanos),
-            files: arguments.files.and_then(|own| usize::try_from(own).ok()),
+            files: arguments.files.and_then(|most| most.try_into().ok()),
         };
         let path = &arguments.output;
         let files = Files::begin(path, &places, rotation, wall).map_err(|error| {
@@ -167,7 +167,7 @@ impl<'a> Session<'a> {
             let since = seconds(nanos.saturating_sub(self.began.1));
             let text = format!("{} {words}", self.taps[place].at.name);
             // The time is left out: its figures are nothing that was heard.
-            let has = |own: &Option<String>| own.as_ref().is_some_and(|own| text.contains(own));
+            let has = |word: &Option<String>| word.as_ref().is_some_and(|word| text.contains(word));
             self.found |= has(&self.arguments.until);
             if self.waiting.is_some() && has(&self.arguments.trigger) {
                 self.files.begins(nanos);
@@ -194,7 +194,8 @@ impl<'a> Session<'a> {
             return Ok(Exit::RigError);
         }
         let paths: Vec<PathBuf> = self.files.paths().map(PathBuf::from).collect();
-        let names: Vec<_> = paths.iter().map(|own| own.display().to_string()).collect();
+        let names = paths.iter().map(|path| path.display().to_string());
+        let names: Vec<_> = names.collect();
         // Older parts were removed.
         let removed = self
             .files
@@ -217,7 +218,7 @@ impl<'a> Session<'a> {
                 }
             }
         }
-        let worst = exits.into_iter().max_by_key(|own| match own {
+        let worst = exits.into_iter().max_by_key(|exit| match exit {
             Exit::Passed => 0,
             Exit::Incomplete => 1,
             Exit::Failed => 2,
@@ -236,7 +237,7 @@ impl<'a> Session<'a> {
         names.dedup();
         names.sort();
         names.dedup();
-        names.iter().filter_map(|own| own.parse().ok()).collect()
+        names.iter().filter_map(|name| name.parse().ok()).collect()
     }
 
     /// Why a part cannot be judged where nothing of it was heard.
@@ -245,7 +246,7 @@ impl<'a> Session<'a> {
             Some(name) => tap.at.name == *name,
             None => matches!(tap.at.port, TapPort::Link(_)),
         };
-        let heard = self.taps.iter().filter(of_part).any(|own| own.pieces > 0);
+        let heard = self.taps.iter().filter(of_part).any(|tap| tap.pieces > 0);
         (!heard).then_some("nothing was heard")
     }
 
@@ -255,7 +256,7 @@ impl<'a> Session<'a> {
         if self.arguments.trigger.is_some() {
             return Some("it begins at the trigger, in the middle of a conversation");
         }
-        let sends = |own: &Tap| ends(&own.at.name).is_some_and(|(_, from, _)| from.is_none());
+        let sends = |tap: &Tap| ends(&tap.at.name).is_some_and(|(_, from, _)| from.is_none());
         if !self.taps.iter().any(sends) {
             return Some("no tap is on the master's outgoing link, so what was sent is not known");
         }
@@ -266,8 +267,8 @@ impl<'a> Session<'a> {
 
 /// CAN adapters first: they take a while, and what serial ports receive meanwhile would wait.
 fn opened_first(taps: &[TapAt]) -> impl Iterator<Item = &TapAt> {
-    let adapter = |own: &&TapAt| matches!(own.port, TapPort::Frames(..));
-    let serial = move |own: &&TapAt| !adapter(own);
+    let adapter = |tap: &&TapAt| matches!(tap.port, TapPort::Frames(..));
+    let serial = move |tap: &&TapAt| !adapter(tap);
     taps.iter()
         .filter(adapter)
         .chain(taps.iter().filter(serial))
@@ -276,7 +277,7 @@ fn opened_first(taps: &[TapAt]) -> impl Iterator<Item = &TapAt> {
 /// The number of drives of the ring of a link, which the tap at the master's outgoing link says.
 fn drives(taps: &[TapAt], link: &str) -> Option<u8> {
     let (ring, ..) = ends(link)?;
-    let mut all = taps.iter().filter_map(|own| ends(&own.name));
-    let first = all.find(|(own, from, _)| *own == ring && from.is_none());
+    let mut all = taps.iter().filter_map(|tap| ends(&tap.name));
+    let first = all.find(|(known, from, _)| *known == ring && from.is_none());
     first.and_then(|(_, _, to)| to).map(|drive| drive + 1)
 }

@@ -99,13 +99,13 @@ fn adapter(at: &TapAt, settings: &TapSettings) -> Result<FrameLink, AdapterError
     let TapPort::Frames(place, rate) = &at.port else {
         return Err(AdapterError::Interrupted);
     };
-    let own = AdapterSettings {
+    let adapter = AdapterSettings {
         place: place.clone(),
         rate: *rate,
         listen_only: true,
         may_acknowledge: settings.may_acknowledge,
     };
-    let mut link = FrameLink::open(&own, Vec::new(), Arc::clone(&settings.stop))?;
+    let mut link = FrameLink::open(&adapter, Vec::new(), Arc::clone(&settings.stop))?;
     link.keep_no_trace();
     Ok(link)
 }
@@ -144,7 +144,7 @@ impl Tap {
             TapPort::Link(_) | TapPort::Frames(..) => None,
         };
         let ear = settings.open(at)?;
-        let mut own = Self {
+        let mut tap = Self {
             at: at.clone(),
             text: (carrier(place.carries).live)(&place, drives),
             place,
@@ -159,9 +159,9 @@ impl Tap {
             damaged: 0,
             reports: Reports::default(),
         };
-        own.note_listening();
-        own.before = own.counts();
-        Ok(own)
+        tap.note_listening();
+        tap.before = tap.counts();
+        Ok(tap)
     }
 
     fn note_listening(&mut self) {
@@ -244,7 +244,7 @@ impl Tap {
                 }
             }
         }
-        let cut = self.cutter.as_mut().map(|own| own.cut(now));
+        let cut = self.cutter.as_mut().map(|cutter| cutter.cut(now));
         let telegrams = cut.into_iter().flatten();
         pieces.extend(telegrams.map(|(from, octets)| Piece::Telegram(from, octets)));
     }
@@ -278,7 +278,7 @@ impl Tap {
         }
         let reports = link.take_reports();
         let words = losses(&reports);
-        pieces.extend(words.map(|own| Piece::Event(now, own)));
+        pieces.extend(words.map(|sentence| Piece::Event(now, sentence)));
         self.reports.add(&reports);
         let trouble = link.trouble().cloned();
         if !sound && trouble != Some(Trouble::Interrupted) {
@@ -460,7 +460,7 @@ mod tests {
         ] {
             let all: Vec<_> = losses(&reports).collect();
             assert!(
-                all.len() == events && all.iter().all(|own| own.contains(" lost: ")),
+                all.len() == events && all.iter().all(|sentence| sentence.contains(" lost: ")),
                 "{all:?}"
             );
             assert_eq!(beside(&reports), words);

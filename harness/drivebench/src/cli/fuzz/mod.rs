@@ -17,7 +17,7 @@ use clap::Subcommand;
 #[derive(Debug, Subcommand)]
 pub enum FuzzCommand {
     /// Play random conversations and report every byte that differs from the manual.
-    #[command(mut_arg("deviates", |own| own.value_parser(run::planted)))]
+    #[command(mut_arg("deviates", |argument| argument.value_parser(run::planted)))]
     Run(FuzzRunArguments),
     /// Play the conversations that a run has kept, the most telling first.
     Replay(ReplayArguments),
@@ -37,7 +37,7 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay(arguments, output),
         FuzzCommand::Power(arguments) => {
-            let power = fuzz_of(BusName::DEFAULT).and_then(|own| own.power);
+            let power = fuzz_of(BusName::DEFAULT).and_then(|fuzz| fuzz.power);
             power.map_or(Ok(Exit::Usage), |power| {
                 power(arguments, &RIG_BUSES, output)
             })
@@ -53,7 +53,7 @@ fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<E
         return Ok(Exit::Usage);
     };
     match fuzz_of(bus_of(&rig).name) {
-        Some(own) => (own.replay)(&rig, arguments, output),
+        Some(fuzz) => (fuzz.replay)(&rig, arguments, output),
         None => Ok(Exit::Usage),
     }
 }

@@ -15,7 +15,7 @@ use crate::scenario::problem::nearest;
 pub(super) fn planted(text: &str) -> Result<Planted, String> {
     read_planted(text, |name| {
         let names = deviation_names();
-        let known = names.iter().find(|own| **own == name.trim());
+        let known = names.iter().find(|known| **known == name.trim());
         let known = known.ok_or_else(|| {
             let remedy = match nearest(name.trim(), &names) {
                 Some(near) => format!("did you mean `{near}`?"),
@@ -54,18 +54,18 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     let part = match arguments.partition {
         None => None,
         Some(part) => {
-            let own = share(arguments, part, &rig);
-            if own.cases == Some(0) {
+            let share = share(arguments, part, &rig);
+            if share.cases == Some(0) {
                 output.complain(&format!("{part} has no case"));
                 return Ok(Exit::NothingSelected);
             }
-            output.say(&format!("{part} has the seed {}\n", own.seed));
-            Some(own)
+            output.say(&format!("{part} has the seed {}\n", share.seed));
+            Some(share)
         }
     };
     let arguments = part.as_ref().unwrap_or(arguments);
     match fuzz_of(bus_of(&rig).name) {
-        Some(own) => (own.run)(&rig, arguments, output),
+        Some(fuzz) => (fuzz.run)(&rig, arguments, output),
         None => Ok(Exit::Usage),
     }
 }

@@ -84,7 +84,7 @@ enum Form {
 }
 
 fn form(path: &Path) -> Result<Form, Failure> {
-    let ending = path.extension().and_then(|own| own.to_str());
+    let ending = path.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("html" | "htm") => Ok(Form::Page),
         Some("svg") => Ok(Form::Picture),
@@ -107,8 +107,8 @@ fn draw(arguments: &PlotArguments) -> Result<String, Failure> {
     for path in &arguments.files {
         let mut recording = read(path).map_err(|error| Failure::refused(error.to_string()))?;
         if !arguments.only.is_empty() {
-            let wanted = |curve: &Curve| arguments.only.iter().any(|own| curve.name.contains(own));
-            recording.curves.retain(wanted);
+            let named = |name: &str| arguments.only.iter().any(|word| name.contains(word));
+            recording.curves.retain(|curve| named(&curve.name));
         }
         align(&mut recording, path, arguments.align)?;
         recordings.push(recording);
@@ -116,10 +116,10 @@ fn draw(arguments: &PlotArguments) -> Result<String, Failure> {
     let names = names(&arguments.files);
     let mut curves = Vec::new();
     for (place, (recording, name)) in recordings.into_iter().zip(&names).enumerate() {
-        curves.extend(recording.curves.into_iter().map(|own| Curve {
-            name: format!("{name}: {}", own.name),
+        curves.extend(recording.curves.into_iter().map(|curve| Curve {
+            name: format!("{name}: {}", curve.name),
             dash: place,
-            ..own
+            ..curve
         }));
     }
     if curves.is_empty() {
@@ -151,8 +151,8 @@ fn draw(arguments: &PlotArguments) -> Result<String, Failure> {
 
 /// Moves a recording to where it is compared.
 fn align(recording: &mut Recording, path: &Path, align: PlotAlignment) -> Result<(), Failure> {
-    let all = recording.curves.iter().flat_map(|own| &own.points);
-    let first = all.map(|own| own.0).min_by(f64::total_cmp);
+    let all = recording.curves.iter().flat_map(|curve| &curve.points);
+    let first = all.map(|point| point.0).min_by(f64::total_cmp);
     match align {
         PlotAlignment::Trigger if recording.triggered => {}
         PlotAlignment::Trigger => {
@@ -162,8 +162,9 @@ fn align(recording: &mut Recording, path: &Path, align: PlotAlignment) -> Result
             )));
         }
         PlotAlignment::First => {
-            let points = recording.curves.iter_mut().flat_map(|own| &mut own.points);
-            points.for_each(|own| own.0 -= first.unwrap_or(0.0));
+            let curves = recording.curves.iter_mut();
+            let points = curves.flat_map(|curve| &mut curve.points);
+            points.for_each(|point| point.0 -= first.unwrap_or(0.0));
         }
     }
     Ok(())
@@ -173,37 +174,41 @@ fn align(recording: &mut Recording, path: &Path, align: PlotAlignment) -> Result
 fn names(files: &[std::path::PathBuf]) -> Vec<String> {
     let short = |path: &Path| {
         path.file_stem()
-            .map(|own| own.to_string_lossy().into_owned())
+            .map(|stem| stem.to_string_lossy().into_owned())
     };
-    let all: Vec<_> = files.iter().filter_map(|own| short(own)).collect();
+    let all: Vec<_> = files.iter().filter_map(|path| short(path)).collect();
     let different: BTreeSet<_> = all.iter().collect();
     match different.len() == files.len() {
         true => all,
-        false => files.iter().map(|own| own.display().to_string()).collect(),
+        false => files
+            .iter()
+            .map(|file| file.display().to_string())
+            .collect(),
     }
 }
 
 /// The fields of a curve in the table; "-" where there is no figure.
 fn row(curve: &Curve) -> [String; 7] {
     let unit = curve.unit.as_str();
-    let value = |own: Option<f64>| match own {
+    let value = |value: Option<f64>| match value {
         None => "-".to_owned(),
-        Some(own) => format!("{} {unit}", number(own, unit))
+        Some(value) => format!("{} {unit}", number(value, unit))
             .trim_end()
             .to_owned(),
     };
-    let known = || curve.known().map(|own| own.1);
+    let known = || curve.known().map(|point| point.1);
     let figures = StepFigures::of(curve);
-    let own = figures.as_ref();
+    let figures = figures.as_ref();
     [
         curve.name.clone(),
         value(known().min_by(f64::total_cmp)),
         value(known().max_by(f64::total_cmp)),
-        value(own.map(|own| own.last)),
-        value(own.and_then(|own| own.step)),
-        own.and_then(|own| own.overshoot)
-            .map_or("-".to_owned(), |own| format!("{own:.1} %")),
-        match own.and_then(|own| own.settled) {
+        value(figures.map(|figures| figures.last)),
+        value(figures.and_then(|figures| figures.step)),
+        figures
+            .and_then(|figures| figures.overshoot)
+            .map_or("-".to_owned(), |percent| format!("{percent:.1} %")),
+        match figures.and_then(|figures| figures.settled) {
             None => "-".to_owned(),
             Some(Settled::Never) => "not settled".to_owned(),
             Some(Settled::After(ms)) => format!("{} ms", number(ms, "ms")),
@@ -212,7 +217,7 @@ fn row(curve: &Curve) -> [String; 7] {
 }
 
 fn text(rows: &[[String; 7]]) -> String {
-    let heads = COLUMNS.map(|own| own.0.to_owned());
+    let heads = COLUMNS.map(|column| column.0.to_owned());
     let all = || std::iter::once(&heads).chain(rows);
     let widths: [usize; 7] = std::array::from_fn(|column| {
         let widths = all().map(|row| row[column].chars().count());
@@ -240,7 +245,7 @@ fn table(rows: &[[String; 7]]) -> Html {
     let mut html = Html::new();
     html.element("table", &[], |html| {
         html.line("caption", &[], "Figures of the curves");
-        html.heads(&COLUMNS.map(|own| own.0));
+        html.heads(&COLUMNS.map(|column| column.0));
         for row in rows {
             html.element("tr", &[], |html| {
                 for field in row {

@@ -93,7 +93,8 @@ fn recording(bytes: &[u8]) -> Result<Recording, Fault> {
     if bytes.starts_with(b"{") {
         return records(bytes);
     }
-    let line = bytes.split(|own| *own == b'\n').next().unwrap_or_default();
+    let mut lines = bytes.split(|byte| *byte == b'\n');
+    let line = lines.next().unwrap_or_default();
     let line = String::from_utf8_lossy(line);
     let line = line.trim_end_matches('\r');
     let found = match line.split_once(',') {
@@ -101,8 +102,8 @@ fn recording(bytes: &[u8]) -> Result<Recording, Fault> {
         Some(("time_ms", _)) => watch(bytes)?,
         _ => return Err(Fault::whole(other(line))),
     };
-    let mut points = found.curves.iter().flat_map(|own| &own.points);
-    match points.any(|own| own.1.is_some()) {
+    let mut points = found.curves.iter().flat_map(|curve| &curve.points);
+    match points.any(|point| point.1.is_some()) {
         true => Ok(found),
         false => Err(Fault::whole("it has no value that an axis can show")),
     }
@@ -139,7 +140,7 @@ impl<'b> Rows<'b> {
         let mut reader = ReaderBuilder::new().from_reader(bytes);
         let heads = reader.headers().map_err(|error| fault(&error))?;
         let names: Vec<_> = heads.iter().map(str::to_owned).collect();
-        names.iter().try_for_each(|own| named(own))?;
+        names.iter().try_for_each(|name| named(name))?;
         Ok(Self {
             reader,
             names,
@@ -211,10 +212,10 @@ impl<'b> Rows<'b> {
 /// Whether a text stands for a value that no axis can have: a word, or more bytes than a number.
 fn is_word(text: &str, unit: &str) -> bool {
     if unit == HEX {
-        return text.bytes().all(|own| own.is_ascii_hexdigit());
+        return text.bytes().all(|byte| byte.is_ascii_hexdigit());
     }
     let not = ["nan", "inf", "infinity"];
-    text.starts_with(|own: char| own.is_ascii_alphabetic())
+    text.starts_with(|letter: char| letter.is_ascii_alphabetic())
         && !not.contains(&text.to_ascii_lowercase().as_str())
 }
 
@@ -252,7 +253,8 @@ fn watch(bytes: &[u8]) -> Result<Recording, Fault> {
     let heads = rows.names.iter().skip(1);
     let mut curves: Vec<_> = heads
         .map(|head| {
-            let unit = head.strip_suffix(']').and_then(|own| own.rsplit_once(" ["));
+            let unit = head.strip_suffix(']');
+            let unit = unit.and_then(|words| words.rsplit_once(" ["));
             let (name, unit) = unit.unwrap_or((head, ""));
             Curve {
                 name: name.to_owned(),
@@ -287,7 +289,7 @@ fn scope(bytes: &[u8]) -> Result<Recording, Fault> {
         if !matches!(signal, "1" | "2") {
             return Err(rows.wrong(1, "no signal: 1 or 2 is expected"));
         }
-        let place = match curves.iter().position(|own| own.0 == signal) {
+        let place = match curves.iter().position(|known| known.0 == signal) {
             Some(place) => place,
             None => {
                 named(name)?;
@@ -301,25 +303,25 @@ fn scope(bytes: &[u8]) -> Result<Recording, Fault> {
                 curves.len() - 1
             }
         };
-        let own = &mut curves[place].1;
-        if own.name != name {
+        let curve = &mut curves[place].1;
+        if curve.name != name {
             return Err(rows.wrong(2, "another name than this signal has in front of it"));
         }
-        if own.unit != unit {
+        if curve.unit != unit {
             return Err(rows.wrong(5, "another unit than this signal has in front of it"));
         }
-        let last = own.points.last().map(|own| own.0 * 1e3);
+        let last = curve.points.last().map(|point| point.0 * 1e3);
         // Rounding may have moved the last one.
-        let at = rows.time(0, last.map(|own| own - 1e-3))?;
+        let at = rows.time(0, last.map(|last| last - 1e-3))?;
         let value = rows.value(4, unit)?;
-        own.points.push((at / 1e3, value));
+        curve.points.push((at / 1e3, value));
     }
     curves.sort_by(|a, b| a.0.cmp(&b.0));
-    let curves: Vec<_> = curves.into_iter().map(|own| own.1).collect();
-    let first = curves.iter().filter_map(|own| own.points.first());
+    let curves: Vec<_> = curves.into_iter().map(|curve| curve.1).collect();
+    let first = curves.iter().filter_map(|curve| curve.points.first());
     Ok(Recording {
         // Without a trigger the first measurement is at 0.
-        triggered: first.map(|own| own.0).min_by(f64::total_cmp) != Some(0.0),
+        triggered: first.map(|point| point.0).min_by(f64::total_cmp) != Some(0.0),
         curves,
     })
 }
@@ -361,16 +363,16 @@ fn records(bytes: &[u8]) -> Result<Recording, Fault> {
             trace.schema
         )));
     }
-    let second = trace.second.map_or(Vec::new(), |own| own.records);
+    let second = trace.second.map_or(Vec::new(), |second| second.records);
     let rings = [("", trace.records), ("2:", second)];
     let all = rings
         .into_iter()
-        .flat_map(|(ring, records)| records.into_iter().map(move |own| (ring, own)));
+        .flat_map(|(ring, records)| records.into_iter().map(move |record| (ring, record)));
     let mut curves = Vec::new();
     for (ring, record) in all {
         let samples = record.samples.into_iter();
         let points: Vec<_> = samples
-            .map(|own| (own.t_ns as f64 / 1e6, own.value))
+            .map(|sample| (sample.t_ns as f64 / 1e6, sample.value))
             .collect();
         named(&record.cell)?;
         named(&record.unit)?;

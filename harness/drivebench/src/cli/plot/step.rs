@@ -43,10 +43,10 @@ impl StepFigures {
         let (begin, first) = *all.first()?;
         let (end, _) = *all.last()?;
         let late = |at: f64| at >= end - END * (end - begin);
-        let ends: Vec<_> = all.iter().filter(|own| late(own.0)).collect();
+        let ends: Vec<_> = all.iter().filter(|point| late(point.0)).collect();
         #[expect(clippy::cast_precision_loss, reason = "a number of samples")]
-        let last = ends.iter().map(|own| own.1).sum::<f64>() / ends.len() as f64;
-        let values = || all.iter().map(|own| own.1);
+        let last = ends.iter().map(|point| point.1).sum::<f64>() / ends.len() as f64;
+        let values = || all.iter().map(|point| point.1);
         let range = values().fold(first, f64::max) - values().fold(first, f64::min);
         let step = last - first;
         if range == 0.0 || step.abs() < STEP * range {
@@ -57,14 +57,15 @@ impl StepFigures {
                 settled: None,
             });
         }
-        let beyond = values().map(|own| (own - last) / step).fold(0.0, f64::max);
+        let beyond = values().map(|value| (value - last) / step);
+        let beyond = beyond.fold(0.0, f64::max);
         Some(Self {
             last,
             step: Some(step),
             overshoot: Some(beyond * 100.0),
             settled: match curve.has_gaps() {
                 true => None,
-                false => settled(&all, (first, last), late),
+                false => settled(&all, first, last, late),
             },
         })
     }
@@ -72,12 +73,13 @@ impl StepFigures {
 
 fn settled(
     all: &[(f64, f64)],
-    (first, last): (f64, f64),
+    first: f64,
+    last: f64,
     late: impl Fn(f64) -> bool,
 ) -> Option<Settled> {
-    let near = |value: f64, own: f64| (own - value).abs() <= NEAR * (last - first).abs();
-    let leaves = all.iter().position(|own| !near(first, own.1))?;
-    let far = all.iter().rposition(|own| !near(last, own.1))?;
+    let near = |value: f64, other: f64| (other - value).abs() <= NEAR * (last - first).abs();
+    let leaves = all.iter().position(|point| !near(first, point.1))?;
+    let far = all.iter().rposition(|point| !near(last, point.1))?;
     // The first sample is near itself and far from the final value.
     let from = all.get(leaves.checked_sub(1)?)?.0;
     match all.get(far + 1) {
@@ -95,7 +97,7 @@ mod tests {
         let points = values.into_iter().enumerate();
         Curve {
             points: points
-                .map(|(at, own)| (f64::from(u16::try_from(at).expect("few")), Some(own)))
+                .map(|(at, value)| (f64::from(u16::try_from(at).expect("few")), Some(value)))
                 .collect(),
             ..Curve::default()
         }
@@ -109,20 +111,20 @@ mod tests {
     fn a_step_has_figures() {
         // Up to 100 with 20 beyond, back through 90, and there from the sample at 13 ms on.
         let values = constant(0.0, 10).chain([50.0, 120.0, 90.0]);
-        let own = StepFigures::of(&curve(values.chain(constant(100.0, 37))));
+        let figures = StepFigures::of(&curve(values.chain(constant(100.0, 37))));
         let expected = StepFigures {
             last: 100.0,
             step: Some(100.0),
             overshoot: Some(20.0),
             settled: Some(Settled::After(4.0)),
         };
-        assert_eq!(own, Some(expected));
+        assert_eq!(figures, Some(expected));
         // Downwards.
         let values = constant(0.0, 10).chain([-50.0, -120.0, -90.0]);
-        let own = StepFigures::of(&curve(values.chain(constant(-100.0, 37)))).expect("figures");
-        assert_eq!(own.step, Some(-100.0));
-        assert_eq!(own.overshoot, Some(20.0));
-        assert_eq!(own.settled, Some(Settled::After(4.0)));
+        let figures = StepFigures::of(&curve(values.chain(constant(-100.0, 37)))).expect("figures");
+        assert_eq!(figures.step, Some(-100.0));
+        assert_eq!(figures.overshoot, Some(20.0));
+        assert_eq!(figures.settled, Some(Settled::After(4.0)));
     }
 
     /// What is not a step, has not ended or was not seen has no figure.
@@ -137,8 +139,8 @@ mod tests {
         assert_eq!((pulse.step, pulse.overshoot), (None, None));
         let mut gap = curve(constant(0.0, 20).chain(constant(100.0, 30)));
         gap.points[21].1 = None;
-        let own = StepFigures::of(&gap).expect("figures");
-        assert_eq!((own.step, own.settled), (Some(100.0), None));
+        let figures = StepFigures::of(&gap).expect("figures");
+        assert_eq!((figures.step, figures.settled), (Some(100.0), None));
         assert_eq!(StepFigures::of(&curve(constant(0.0, 3))), None);
         let word = Curve {
             unit: "hex".to_owned(),

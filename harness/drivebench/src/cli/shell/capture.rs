@@ -50,8 +50,9 @@ impl SessionCapture {
     ) -> Result<Self, Failure> {
         let path = PathBuf::from(path);
         refuse_existing(&path)?;
-        let folder = path.parent().filter(|own| !own.as_os_str().is_empty());
-        if folder.is_some_and(|own| !own.is_dir()) || path.file_name().is_none() {
+        let folder = path.parent();
+        let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) || path.file_name().is_none() {
             return Err(Failure::refused(format!(
                 "{}: a file in a folder that is there is expected",
                 path.display()
@@ -67,7 +68,7 @@ impl SessionCapture {
         let (file, recorder) = opened.map_err(|error| unwritten(&path, &error))?;
         let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let wall = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or_default();
-        let mut own = Self {
+        let mut capture = Self {
             path,
             file,
             recorder,
@@ -83,11 +84,11 @@ impl SessionCapture {
         };
         if !simulated {
             // A computer that stands still reads late and repeats requests, which no line would show.
-            own.note_loss(
-                "the line's own times are lost: these are of the bench, which sends and reads; a tap accuses drives",
+            capture.note_loss(
+                "the line's capture times are lost: these are of the bench, which sends and reads; a tap accuses drives",
             )?;
         }
-        Ok(own)
+        Ok(capture)
     }
 
     /// Writes what the bench has recorded since the last call. Afterwards its link may begin again.
@@ -119,7 +120,7 @@ impl SessionCapture {
         }
         drop(record.traces);
         let behind = self.began + self.lasted;
-        let new = tape.pieces.iter().filter(|own| own.0 > Instant::START);
+        let new = tape.pieces.iter().filter(|piece| piece.0 > Instant::START);
         let written = self.write(new.map(|(_, place, piece)| (*place, piece.later(behind))));
         self.lasted = self.lasted + lasts;
         self.taken = (record.now, record.carried);
@@ -217,8 +218,8 @@ fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
 
 /// How many octets or frames these are.
 fn recorded(traces: &[Trace]) -> u64 {
-    let channels = traces.iter().flat_map(|own| &own.channels);
-    let counts = channels.map(|own| own.octets().len() + own.frames().len());
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
+    let counts = channels.map(|channel| channel.octets().len() + channel.frames().len());
     counts.sum::<usize>() as u64
 }
 

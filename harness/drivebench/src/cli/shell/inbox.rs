@@ -64,13 +64,13 @@ pub(crate) struct RequestReader {
 impl RequestReader {
     /// Reads requests from an input in a thread of its own.
     pub(crate) fn read(&self, input: impl Read + Send + 'static, out: LineWriter) {
-        let own = self.clone();
+        let reader = self.clone();
         spawn(move || {
             let mut input = BufReader::new(input);
             while let Ok(Some(line)) = next_line(&mut input) {
-                own.take_line(line, &out);
+                reader.take_line(line, &out);
             }
-            own.push_end();
+            reader.push_end();
         });
     }
 
@@ -114,7 +114,7 @@ impl RequestReader {
             _ => {}
         }
         let overtakes = request.overtakes();
-        let alike = |own: &&SessionItem| own.overtakes() == overtakes;
+        let alike = |request: &&SessionItem| request.overtakes() == overtakes;
         if state.waiting.iter().filter(alike).count() >= MOST_WAITING {
             return false;
         }
@@ -249,7 +249,7 @@ impl LineWriter {
             gone: AtomicBool::new(false),
             interrupt,
         });
-        let own = Arc::clone(&client);
+        let lost_client = Arc::clone(&client);
         let thread = spawn(move || {
             for next in waiting {
                 let text: String = match next {
@@ -261,9 +261,9 @@ impl LineWriter {
                 };
                 let written = output.write_all(text.as_bytes());
                 if written.and_then(|()| output.flush()).is_err() {
-                    return own.is_lost();
+                    return lost_client.is_lost();
                 }
-                own.unread.fetch_sub(text.len(), Ordering::Relaxed);
+                lost_client.unread.fetch_sub(text.len(), Ordering::Relaxed);
             }
         });
         (Self { lines, client }, thread)
@@ -369,9 +369,10 @@ mod tests {
         // One that is refused breaks off all the same.
         assert!(!inbox.push(json!(0), SessionRequest::Cancel { of: None }));
         let mut next = std::iter::from_fn(|| inbox.next(Duration::ZERO));
-        assert!(next.by_ref().take(MOST_WAITING).all(|own| own.overtakes()));
+        let mut first = next.by_ref().take(MOST_WAITING);
+        assert!(first.all(|request| request.overtakes()));
         let rest: Vec<_> = next.collect();
-        let cancelled = |own: &SessionItem| matches!(own, SessionItem::Cancelled(_));
+        let cancelled = |request: &SessionItem| matches!(request, SessionItem::Cancelled(_));
         assert_eq!(
             (rest.len(), rest.iter().all(cancelled)),
             (MOST_WAITING, true)

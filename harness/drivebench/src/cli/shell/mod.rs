@@ -97,10 +97,10 @@ fn for_people(arguments: &ShellArguments) -> std::io::Result<Exit> {
         interrupt_flag_without_ctrl_c(),
         interrupt_flag_without_ctrl_c(),
     ];
-    let own = Arc::clone(&interrupt);
+    let interrupted = Arc::clone(&interrupt);
     let ((out, writer), editor) = match editor {
-        Some((editor, printer)) => (LineWriter::write(printer, own), Some(editor)),
-        None => (LineWriter::write(std::io::stdout(), own), None),
+        Some((editor, printer)) => (LineWriter::write(printer, interrupted), Some(editor)),
+        None => (LineWriter::write(std::io::stdout(), interrupted), None),
     };
     let piped = editor.is_none();
     let mut told = people_output(&out, piped);
@@ -165,10 +165,10 @@ fn serve(
     // The opening ends like a request.
     inbox.begin();
     if !arguments.json {
-        let own = inbox.clone();
+        let signalled = inbox.clone();
         // Where the signal cannot be caught, its default action stays.
         let _as_before = at_ctrl_c(move || {
-            let _overtakes = own.push(Value::Null, SessionRequest::Stop { drive: None });
+            let _overtakes = signalled.push(Value::Null, SessionRequest::Stop { drive: None });
         });
     }
     let options = UseOptions {

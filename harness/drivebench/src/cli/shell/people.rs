@@ -8,7 +8,7 @@ use crate::cli::help::command;
 use crate::command::args::duration;
 use crate::counted::counted;
 use crate::scenario::problem::nearest;
-use clap::Arg;
+use clap::{Arg, Command};
 use rustyline::completion::{Completer, Pair};
 use rustyline::error::ReadlineError;
 use rustyline::highlight::Highlighter;
@@ -220,7 +220,7 @@ pub(super) fn read_line(line: &str) -> Result<Option<SessionRequest>, String> {
             path: one("one file in pcapng, such as ring.pcapng,")?,
         },
         "capture-end" => SessionRequest::CaptureEnd {},
-        own if COMMANDS.contains(&own) => SessionRequest::Command { words },
+        name if COMMANDS.contains(&name) => SessionRequest::Command { words },
         other => return Err(unknown(other)),
     }))
 }
@@ -245,12 +245,10 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
     let program = command();
     let Some(name) = name else {
         let about = |name: &str| {
-            let own = program
-                .find_subcommand(name)
-                .and_then(|own| own.get_about());
+            let found = program.find_subcommand(name).and_then(Command::get_about);
             (
                 name.to_owned(),
-                own.map(ToString::to_string).unwrap_or_default(),
+                found.map(ToString::to_string).unwrap_or_default(),
             )
         };
         let all = COMMANDS.into_iter().map(about);
@@ -263,23 +261,23 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
         text.push_str("Drives are numbers: 0, 0..2, all. Ctrl-C stops what moves, Ctrl-D ends the shell in the safe state.\n");
         return Ok(text);
     };
-    if let Some((_, usage, about)) = OWN.iter().find(|(own, ..)| *own == name) {
+    if let Some((_, usage, about)) = OWN.iter().find(|(word, ..)| *word == name) {
         return Ok(format!("{usage}: {about}\n"));
     }
     let known = COMMANDS.contains(&name);
     let found = program.find_subcommand(name).filter(|_| known);
     let found = found.ok_or_else(|| unknown(name))?.clone();
     // Options that the shell has settled, and those of the program, are no choice here.
-    let settled = |own: &Arg| {
-        let long = own.get_long().unwrap_or_default();
+    let settled = |argument: &Arg| {
+        let long = argument.get_long().unwrap_or_default();
         SETTLED
             .iter()
-            .any(|own| own.strip_prefix("--") == Some(long))
-            || own.is_global_set()
+            .any(|option| option.strip_prefix("--") == Some(long))
+            || argument.is_global_set()
     };
-    let mut found = found.mut_args(|own| {
-        let hide = settled(&own);
-        own.hide(hide)
+    let mut found = found.mut_args(|argument| {
+        let hide = settled(&argument);
+        argument.hide(hide)
     });
     let text = found.render_help().to_string();
     Ok(text.replace("Usage: drivebench ", "Usage: "))
@@ -287,7 +285,7 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
 
 /// What came of a request, where its command has not printed it.
 pub(super) fn text(result: &Value) -> String {
-    let word = |own: &Value, key: &str| own[key].as_str().unwrap_or_default().to_owned();
+    let word = |object: &Value, key: &str| object[key].as_str().unwrap_or_default().to_owned();
     let mut text = word(result, "found");
     if let Some(packets) = result["packets"].as_u64() {
         // Writing to a String cannot fail.
@@ -301,17 +299,17 @@ pub(super) fn text(result: &Value) -> String {
     let Some(scenarios) = result["scenarios"].as_array() else {
         return text;
     };
-    for own in scenarios {
+    for scenario in scenarios {
         // Writing to a String cannot fail.
         let _infallible = writeln!(
             text,
             "{} {}  {:.3} ms  {}",
-            word(own, "verdict"),
-            word(own, "name"),
-            own["took_ms"].as_f64().unwrap_or_default(),
-            word(own, "title")
+            word(scenario, "verdict"),
+            word(scenario, "name"),
+            scenario["took_ms"].as_f64().unwrap_or_default(),
+            word(scenario, "title")
         );
-        let finding = &own["finding"];
+        let finding = &scenario["finding"];
         if !finding.is_null() {
             let _infallible = writeln!(
                 text,
@@ -320,7 +318,7 @@ pub(super) fn text(result: &Value) -> String {
                 word(finding, "what")
             );
         }
-        let notes = own["notes"].as_array().into_iter().flatten();
+        let notes = scenario["notes"].as_array().into_iter().flatten();
         for note in notes.filter_map(Value::as_str) {
             let _infallible = writeln!(text, "  note: {note}");
         }
@@ -369,16 +367,16 @@ fn completions(rig: &str, front: &str, start: usize) -> Vec<Pair> {
         let fits = names().filter(|name| name.starts_with(current));
         return fits.map(pair).collect();
     }
-    let own = OWN.iter().any(|(own, ..)| *own == name);
+    let is_own = OWN.iter().any(|(word, ..)| *word == name);
     // The program's commands of these names take something else, but for the scenario of `run`.
-    if own && (name != "run" || words.len() > 1) {
+    if is_own && (name != "run" || words.len() > 1) {
         return Vec::new();
     }
     // What the rig is decides which cells there are.
     words.splice(1..1, ["--rig".to_owned(), rig.to_owned()]);
     words.push(current.to_owned());
     let fits = fitting(&command(), &words).words;
-    let is_settled = |word: &str| own && word.starts_with('-') || SETTLED.contains(&word);
+    let is_settled = |word: &str| is_own && word.starts_with('-') || SETTLED.contains(&word);
     let fits = fits.iter().filter(|word| !is_settled(word));
     fits.map(|word| pair(word)).collect()
 }
@@ -474,7 +472,7 @@ mod tests {
             let start = front.rfind(' ').map_or(0, |space| space + 1);
             let all = completions(rig, front, start);
             all.into_iter()
-                .map(|own| own.replacement)
+                .map(|pair| pair.replacement)
                 .collect::<Vec<_>>()
         };
         // The first bus behind the default one.

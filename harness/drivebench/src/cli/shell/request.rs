@@ -147,17 +147,17 @@ impl SessionRequest {
             Self::Off { drive } => ("off", drive.word(), &[]),
             _ => return None,
         };
-        let own: &[&str] = match self {
+        let options: &[&str] = match self {
             Self::Read { .. } => &["--for", "0ms", "--format", "csv"],
             Self::State { .. } => &["--format", "json"],
             _ => &[],
         };
         let front = [name.to_owned()].into_iter();
-        let own = own.iter().map(|word| (*word).to_owned());
+        let options = options.iter().map(|word| (*word).to_owned());
         let back = [String::from("--"), drive].into_iter();
         Some(
             front
-                .chain(own)
+                .chain(options)
                 .chain(back)
                 .chain(rest.iter().cloned())
                 .collect(),

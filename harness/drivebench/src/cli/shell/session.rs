@@ -146,9 +146,9 @@ impl HeldSession {
                     if let Err(failure) = self.bench.pass(KEPT)
                         && self.bench.trouble().is_none()
                     {
-                        let mut own = Output::collecting();
-                        failure.tell(&mut own);
-                        let [_, what] = own.take_collected();
+                        let mut collected = Output::collecting();
+                        failure.tell(&mut collected);
+                        let [_, what] = collected.take_collected();
                         self.happened(SessionEvent::Bus {
                             what: what.trim_end().to_owned(),
                         });
@@ -204,16 +204,16 @@ impl HeldSession {
     /// Writes what a capture of simulated drives has recorded: their record grows fast. That of a port has a bound, and can end in the
     /// middle of a telegram.
     fn write_capture(&mut self) {
-        let Some(capture) = self.capture.as_mut().filter(|own| !own.is_broken()) else {
+        let Some(capture) = self.capture.as_mut().filter(|capture| !capture.is_broken()) else {
             return;
         };
         if !self.rig.is_simulated() || !self.bench.is_between_telegrams() {
             return;
         }
         if let Err(failure) = capture.collect(&mut *self.bench) {
-            let mut own = Output::collecting();
-            failure.tell(&mut own);
-            let [_, what] = own.take_collected();
+            let mut collected = Output::collecting();
+            failure.tell(&mut collected);
+            let [_, what] = collected.take_collected();
             self.bench.record_from_now(None);
             let what = format!("the capture takes nothing more: {}", what.trim_end());
             self.happened(SessionEvent::Bus { what });
@@ -307,10 +307,11 @@ impl HeldSession {
         }
         let turning = values(output.collected_result()).into_iter();
         let turning: Vec<_> = turning
-            .filter_map(|own| {
-                let speed = own["value"].as_f64().filter(|own| own.abs() >= STANDS)?;
-                let unit = own["unit"].as_str().unwrap_or_default();
-                Some(format!("{}: {speed:.1} {unit}", own["drive"].as_str()?))
+            .filter_map(|value| {
+                let speed = value["value"].as_f64();
+                let speed = speed.filter(|speed| speed.abs() >= STANDS)?;
+                let unit = value["unit"].as_str().unwrap_or_default();
+                Some(format!("{}: {speed:.1} {unit}", value["drive"].as_str()?))
             })
             .collect();
         match turning.is_empty() {
@@ -388,12 +389,13 @@ impl HeldSession {
         let reading = matches!(request, SessionRequest::Run { .. });
         if exit == Exit::Passed || reading && !result.is_null() {
             let mut result = result;
-            if let Value::Object(own) = &mut result {
-                if !text.is_empty() && !own.contains_key("values") && !own.contains_key("data") {
-                    own.insert("text".to_owned(), json!(text));
+            if let Value::Object(object) = &mut result {
+                let has = |key| object.contains_key(key);
+                if !text.is_empty() && !has("values") && !has("data") {
+                    object.insert("text".to_owned(), json!(text));
                 }
                 if !notes.is_empty() {
-                    own.insert("notes".to_owned(), json!(notes));
+                    object.insert("notes".to_owned(), json!(notes));
                 }
             }
             return self.out.put(&SessionLine::Result { id, result });
@@ -427,7 +429,7 @@ impl HeldSession {
                 let written = line.trim_start();
                 let bare = ["!", "drive", "slave", "?"]
                     .iter()
-                    .any(|own| written.starts_with(own));
+                    .any(|mark| written.starts_with(mark));
                 let line = if bare {
                     line.clone()
                 } else {
@@ -490,7 +492,7 @@ impl HeldSession {
         };
         if let Some(word) = words
             .iter()
-            .find(|word| SETTLED.iter().any(|own| is(word, own)))
+            .find(|word| SETTLED.iter().any(|option| is(word, option)))
         {
             return Err(Failure::refused(format!(
                 "{word}: the session has settled it; leave it out"
@@ -503,10 +505,11 @@ impl HeldSession {
             ));
         }
         let program = command();
-        let own = program.find_subcommand(name);
+        let found = program.find_subcommand(name);
         let has = |long: &str| {
-            own.is_some_and(|own| {
-                own.get_arguments()
+            found.is_some_and(|command| {
+                command
+                    .get_arguments()
                     .any(|argument| argument.get_long() == Some(long))
             })
         };
@@ -553,7 +556,7 @@ impl HeldSession {
                 ));
             }
         };
-        let size = Some(self.rig.ring_size()).filter(|own| *own > 0);
+        let size = Some(self.rig.ring_size()).filter(|size| *size > 0);
         let mut entries = Vec::new();
         for source in sources {
             let entry = Entry::fitting(source, size);
@@ -577,7 +580,7 @@ impl HeldSession {
             true => Exit::of(&verdicts, false),
             false => Exit::of(&verdicts, false).max(Exit::Incomplete),
         };
-        let worst = verdicts.iter().max().map_or("", |own| own.name());
+        let worst = verdicts.iter().max().map_or("", |verdict| verdict.name());
         let result = json!({
             "code": exit as u8, "verdict": worst, "counts": counts, "scenarios": all, "not_played": entries.len() - all.len(),
         });

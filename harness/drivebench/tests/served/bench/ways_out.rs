@@ -96,7 +96,7 @@ fn between(served: &Served, bytes: usize, program: Receiver<String>) -> String {
 
 /// A command that is interrupted when it has sent this number of bytes says these words, and the motor stands then.
 #[track_caller]
-fn interrupted((served, desk): (&Served, &Desk), command: &[&str], bytes: usize, words: &str) {
+fn interrupted(served: &Served, desk: &Desk, command: &[&str], bytes: usize, words: &str) {
     let (id, program) = channel();
     let address = between(served, bytes, program);
     let PortAddress::Tcp(ring) = &served.endpoints[0] else {
@@ -144,7 +144,7 @@ fn interrupted_while_the_rig_is_opened() {
         let (served, desk) = desk(quiet);
         turn(&desk);
         let words = format!("interrupted; safe state: {SAFE}");
-        interrupted((&served, &desk), &["read", "0", "nist"], bytes, &words);
+        interrupted(&served, &desk, &["read", "0", "nist"], bytes, &words);
     }
 }
 
@@ -163,7 +163,7 @@ fn every_command_ends_in_the_safe_state() {
     ] {
         turn(&desk);
         let words: Vec<_> = command.split(' ').collect();
-        interrupted((&served, &desk), &words, 300, SAFE);
+        interrupted(&served, &desk, &words, 300, SAFE);
     }
 }
 
