@@ -7,14 +7,14 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 /// Runs the program to its end.
-pub(crate) fn drivebench(arguments: &[&str]) -> Output {
+fn drivebench(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
     command.args(arguments).stdin(Stdio::null());
     command.output().expect("the program")
 }
 
 /// The names of their files.
-pub(crate) fn names(folder: &Path) -> Vec<std::ffi::OsString> {
+fn names(folder: &Path) -> Vec<std::ffi::OsString> {
     findings(folder)
         .iter()
         .filter_map(|path| path.file_name().map(ToOwned::to_owned))
@@ -22,7 +22,7 @@ pub(crate) fn names(folder: &Path) -> Vec<std::ffi::OsString> {
 }
 
 /// What a record holds but for how often the progress was written.
-pub(crate) fn settled(folder: &Path) -> Vec<Value> {
+fn settled(folder: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(folder.join(RECORD)).expect("a record");
     let lines = text
         .lines()
@@ -39,7 +39,7 @@ pub(crate) fn settled(folder: &Path) -> Vec<Value> {
 }
 
 /// Begins a run and kills it (SIGKILL) when some of it is done.
-pub(crate) fn begin_and_kill(arguments: &[&str], folder: &Path) {
+fn begin_and_kill(arguments: &[&str], folder: &Path) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
         .args(arguments)
         .stdin(Stdio::null())
@@ -61,44 +61,38 @@ pub(crate) fn begin_and_kill(arguments: &[&str], folder: &Path) {
 /// Killed between two cases a run goes on, and comes to what an undisturbed one comes to.
 #[test]
 fn a_killed_run_goes_on() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (killed, whole) = (folder.path().join("killed"), folder.path().join("whole"));
-    let run = [
-        "fuzz",
-        "run",
-        "--deviates",
-        "1=process-data-ignored",
-        "--seed",
-        "5",
-        "--findings",
-        "99",
-    ];
-    let cases = ["--cases", "4000", "--out"];
-    let undisturbed = drivebench(&[&run[..], &cases[..], &[name(&whole)]].concat());
-    ended(&undisturbed, 1, "4000 cases");
-    begin_and_kill(&[&run[..], &cases[..], &[name(&killed)]].concat(), &killed);
-    let record = killed.join(RECORD);
-    // Half a line at its end, as a killed writer leaves it.
-    let mut text = std::fs::read_to_string(&record).expect("a record");
-    text.push_str("{\"kind\":\"kept\",\"num");
-    std::fs::write(&record, text).expect("room");
-    let resumed = drivebench(&[
-        "fuzz",
-        "run",
-        "--cases",
-        "4000",
-        "--findings",
-        "99",
-        "--resume",
-        name(&killed),
-    ]);
-    ended(&resumed, 1, "4000 cases");
-    assert_eq!(settled(&killed), settled(&whole));
-    assert_eq!(names(&killed), names(&whole));
-    assert!(!names(&killed).is_empty());
-    for (one, other) in findings(&killed).iter().zip(findings(&whole)) {
-        let read = |path: &Path| std::fs::read(path).expect("a finding");
-        assert_eq!(read(one), read(&other));
+    for (planted, cases) in [
+        (&["--deviates", "1=process-data-ignored"][..], "4000"),
+        (
+            &["--rig", "sim:2,3", "--deviates", "2:1=process-data-ignored"],
+            "2000",
+        ),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (killed, whole) = (folder.path().join("killed"), folder.path().join("whole"));
+        let fixed = ["fuzz", "run", "--cases", cases, "--findings", "99"];
+        let begin = [&fixed[..], planted, &["--seed", "5", "--out"]].concat();
+        let ending = format!("{cases} cases");
+        ended(
+            &drivebench(&[&begin[..], &[name(&whole)]].concat()),
+            1,
+            &ending,
+        );
+        begin_and_kill(&[&begin[..], &[name(&killed)]].concat(), &killed);
+        let record = killed.join(RECORD);
+        // Half a line at its end, as a killed writer leaves it.
+        let mut text = std::fs::read_to_string(&record).expect("a record");
+        text.push_str("{\"kind\":\"kept\",\"num");
+        std::fs::write(&record, text).expect("room");
+        let resumed = drivebench(&[&fixed[..], &["--resume", name(&killed)]].concat());
+        ended(&resumed, 1, &ending);
+        assert_eq!(settled(&killed), settled(&whole));
+        assert_eq!(names(&killed), names(&whole));
+        assert!(!names(&killed).is_empty());
+        for (one, other) in findings(&killed).iter().zip(findings(&whole)) {
+            let read = |path: &Path| std::fs::read(path).expect("a finding");
+            assert_eq!(read(one), read(&other));
+        }
     }
 }
 
