@@ -5,12 +5,10 @@ mod edited;
 mod edits;
 mod embedded;
 mod explored;
-mod inverters_on_rig;
+mod lines;
 mod merge;
 mod merge_qualified;
 mod named;
-mod on_can;
-mod on_can_qualify;
 #[path = "../common/program.rs"]
 mod program;
 mod simulated;
