@@ -73,27 +73,6 @@ fn lines_of_nonsense() {
     ended(&output, 0, "");
 }
 
-/// A last line without its end is read if it is whole JSON. The end is an orderly one.
-#[test]
-fn half_a_line_at_the_end() {
-    for (line, code) in [
-        (r#"{"id":1,"do":"info"}"#, 0),
-        (r#"{"id":1,"do":"info"#, 2),
-        ("{", 2),
-        ("\u{0}", 2),
-    ] {
-        let desk = desk();
-        let mut session = Session::open(&desk, &["--rig", "sim:3"]);
-        let mut input = session.input.take().expect("open");
-        input.write_all(line.as_bytes()).expect("a reader");
-        drop(input);
-        assert_eq!(code_of(&session.answer()), code, "{line}");
-        let (last, output) = session.end();
-        assert_eq!((&last["event"], &last["code"]), (&json!("end"), &json!(0)));
-        ended(&output, 0, "");
-    }
-}
-
 /// A client that sends and reads nothing is lost after a bounded number of answers, and of bytes.
 #[test]
 fn a_client_that_reads_nothing() {

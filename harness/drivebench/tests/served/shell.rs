@@ -1,14 +1,12 @@
-//! `drivebench shell` as people use it: at a terminal, and with lines of a pipe.
+//! `drivebench shell` as people use it: at a terminal.
 
-use crate::program::{Desk, ended};
+use crate::program::Desk;
 use crate::ring::Served;
 use crate::session::at;
 use crate::top::terminal::in_session;
 use crate::top::tty::Tty;
 use rustix::process::{Pid, Signal, kill_process};
-use std::io::Write;
 use std::path::Path;
-use std::process::{Output, Stdio};
 
 fn shell(arguments: &[&str]) -> Tty {
     let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
@@ -101,51 +99,5 @@ fn signals_end_in_the_safe_state() {
         assert_eq!(tty.ended().code(), Some(130));
         says(&tty, "safe state");
         tty.has_its_modes();
-    }
-}
-
-fn piped(arguments: &[&str], lines: &str) -> Output {
-    let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
-    let mut command = desk.command(&["shell"]);
-    let mut child = command
-        .args(arguments)
-        .stdin(Stdio::piped())
-        .spawn()
-        .expect("the program");
-    let mut input = child.stdin.take().expect("a pipe");
-    input.write_all(lines.as_bytes()).expect("a reader");
-    drop(input);
-    child.wait_with_output().expect("its end")
-}
-
-/// Lines of a pipe are done one by one, without an editor; the first that fails ends the session with its exit code.
-#[test]
-fn lines_of_a_pipe() {
-    let lines = "# a remark\n\nwrite 0 FE13=12\nread 0 FE13\nrun 9.7-parity-error\n";
-    let all = piped(&["--rig", "sim:3"], lines);
-    ended(&all, 0, "");
-    let said = String::from_utf8_lossy(&all.stdout);
-    assert!(
-        said.contains("FE13") && said.contains("passed 9.7-parity-error"),
-        "{said}"
-    );
-    assert!(!said.contains('\x1b') && !said.contains("sim:3>"), "{said}");
-    let some = piped(
-        &["--rig", "sim:3"],
-        "write 0 FE13=12\ngo 0\nwrite 0 FE13=13\n",
-    );
-    ended(&some, 2, "line 2 ends the session");
-    assert!(
-        !String::from_utf8_lossy(&some.stdout).contains("13 ("),
-        "{some:?}"
-    );
-    ended(&piped(&["--rig", "sim:3"], "run absent\n"), 2, "absent");
-    ended(&piped(&["--rig", "absent"], ""), 2, "absent");
-    let mut long = vec![b'x'; 3 << 20];
-    long.push(b'\n');
-    let long = String::from_utf8(long).expect("text");
-    ended(&piped(&["--rig", "sim:3"], &long), 2, "too long");
-    for other in ["sim:unitek:1", "sim:nordac"] {
-        ended(&piped(&["--rig", other], "info\nhelp go\n"), 0, "");
     }
 }
