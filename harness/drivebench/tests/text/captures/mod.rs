@@ -1,6 +1,5 @@
 //! What a run leaves for other tools, and captures that are read back.
 
-mod empty;
 mod forms;
 mod hostile;
 mod round_trip;

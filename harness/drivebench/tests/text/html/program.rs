@@ -51,32 +51,6 @@ fn run_writes_a_page_over_an_old_one() {
     assert_eq!(read(&file), html);
 }
 
-#[test]
-fn a_page_that_cannot_be_written_is_said_before_the_run() {
-    let own = folder("refused");
-    let nowhere = own.join("no/page.html");
-    for (place, why) in [
-        (path(&nowhere), "no such folder"),
-        (path(&own), "it is a folder"),
-    ] {
-        for command in [
-            &["run", "9.2-synco"][..],
-            &["qualify", "--rig", "sim:3"],
-            &["campaign", "9.9-silence"],
-        ] {
-            let mut arguments = command.to_vec();
-            arguments.extend(["--html", place]);
-            let output = drivebench(&arguments);
-            let said = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-            assert!(
-                said.contains(why) && output.stdout.is_empty(),
-                "{arguments:?}: {said}"
-            );
-        }
-    }
-}
-
 /// The record is the truth of a run, and the reports follow from it, byte by byte.
 #[test]
 fn a_folder_gives_its_reports_again() {

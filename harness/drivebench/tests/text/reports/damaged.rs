@@ -1,6 +1,6 @@
 //! Records that are damaged: an exit code that says so and a place, never a panic.
 
-use super::{Bench, verify};
+use super::Bench;
 use harness::evidence::{RecordError, fuzz, read};
 use std::path::PathBuf;
 
@@ -118,83 +118,6 @@ fn every_mistake_has_its_place() {
     assert_eq!(error(deep.as_bytes()).line, 3);
     let whole = format!("{text}{{\"kind\":\"begin\",\"t\":0}}\n");
     assert!(error(whole.as_bytes()).message.contains("behind the end"));
-}
-
-/// The program: exit code 1, 2 or 5, and where the record is none, the line.
-#[test]
-fn the_program_names_the_place() {
-    let (_bench, folder, text) = run();
-    let (code, said) = verify(&folder);
-    assert_eq!(code, Some(0), "{said}");
-    let record = folder.join("run.jsonl");
-    let first = text.find('\n').expect("lines") + 1;
-    let mut bytes = text.clone().into_bytes();
-    bytes[first + 3] = 0x80;
-    std::fs::write(&record, &bytes).expect("room");
-    let (code, said) = verify(&folder);
-    assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains(&format!("line 2, column 4 (byte {})", first + 3)),
-        "{said}"
-    );
-    // A record that says nothing wrong is held against the sums, and against its own bytes.
-    std::fs::remove_file(folder.join("SHA256SUMS")).expect("sums");
-    let judged = |text: &str, words: &str| {
-        std::fs::write(&record, text).expect("room");
-        let (code, said) = verify(&folder);
-        assert_eq!(code, Some(1), "{said}");
-        assert!(said.contains(words), "{words}: {said}");
-    };
-    let verdict = text.find("{\"kind\":\"verdict\"").expect("a verdict");
-    let (before, behind) = text.split_at(verdict);
-    // Something that the scenario does not ask for.
-    let more = "{\"kind\":\"sent\",\"ring\":1,\"t\":78125,\"bytes\":\"80\"}\n";
-    judged(
-        &format!("{before}{more}{behind}"),
-        "the record goes on where the scenario ends",
-    );
-    let took = behind.find("\"took\":").expect("a time") + 7;
-    judged(
-        &format!("{before}{}9{}", &behind[..took], &behind[took..]),
-        "the record says that it took",
-    );
-    let never = behind.replacen(
-        "\"remarks\":[]",
-        "\"remarks\":[\"this fault never happened: 1->0 byte 9: drop\"]",
-        1,
-    );
-    std::fs::write(&record, format!("{before}{never}")).expect("room");
-    let (code, said) = verify(&folder);
-    // What came of the scenario says nothing of it.
-    assert_eq!(code, Some(1), "{said}");
-    assert!(
-        said.contains("this fault never happened: 1->0 byte 9: drop"),
-        "{said}"
-    );
-}
-
-/// The rig's file is kept byte for byte, its comments too.
-#[test]
-fn the_rigs_file_is_its_own() {
-    let (bench, folder, text) = run();
-    let own = std::fs::read(bench.path("two.toml")).expect("a rig");
-    assert_eq!(std::fs::read(folder.join("rig.toml")).expect("a rig"), own);
-    std::fs::remove_file(folder.join("SHA256SUMS")).expect("sums");
-    std::fs::write(folder.join("rig.toml"), [&own[..], b"# another\n"].concat()).expect("room");
-    let (code, said) = verify(&folder);
-    assert_eq!(code, Some(1), "{said}");
-    assert!(
-        said.contains("rig.toml is not the file that was used"),
-        "{said}"
-    );
-    let other = text.replacen("\"rings\":[2]", "\"rings\":[3]", 1);
-    std::fs::write(folder.join("run.jsonl"), other).expect("room");
-    let (code, said) = verify(&folder);
-    assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("line 1") && said.contains("rings are 3"),
-        "{said}"
-    );
 }
 
 /// Cut anywhere a record is one up to there, or says where it is none.

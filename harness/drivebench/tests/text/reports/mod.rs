@@ -4,7 +4,7 @@ mod damaged;
 mod junit;
 mod schema;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 
 /// What makes the drives of a simulated rig its own, which all scenarios share.
@@ -79,10 +79,4 @@ fn program(arguments: &[&str]) -> Command {
 fn said(output: &Output) -> String {
     let text = [&output.stdout[..], &output.stderr[..]].concat();
     String::from_utf8_lossy(&text).into_owned()
-}
-
-fn verify(folder: &Path) -> (Option<i32>, String) {
-    let folder = folder.to_str().expect("a name");
-    let output = program(&["verify", folder]).output().expect("the program");
-    (output.status.code(), said(&output))
 }
