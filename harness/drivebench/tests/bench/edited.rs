@@ -83,7 +83,7 @@ fn findings(edits: &[(&str, &str, &str)]) {
         let line = edited
             .lines()
             .zip(text.lines())
-            .find(|(own, other)| own != other);
+            .find(|(stated, other)| stated != other);
         let (stated, made) = line.expect("a line");
         ended(
             &verify(),
@@ -147,8 +147,8 @@ fn a_fuzz_run_on_a_ring_with_ports_is_verified() {
         refused(&file, &fewer.to_string());
     }
     let scenario = file.with_extension("scn");
-    let own = fs::read_to_string(&scenario).expect("a scenario");
-    refused(&scenario, &(own + "> 80\n"));
+    let text = fs::read_to_string(&scenario).expect("a scenario");
+    refused(&scenario, &(text + "> 80\n"));
     // Without its attempts it is as one of an earlier version: not confirmed.
     let mut bare = finding.clone();
     bare.as_object_mut().expect("an object").remove("attempts");

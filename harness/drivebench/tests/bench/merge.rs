@@ -32,8 +32,8 @@ fn desk(scenarios: &[(&str, &str)]) -> Desk {
 }
 
 fn run(desk: &Desk, rig: &str, folder: &str, more: &[&str]) -> Output {
-    let own = ["run", "all", "--rig", rig, "--evidence", folder];
-    desk.run(&[&own, more].concat())
+    let fixed = ["run", "all", "--rig", rig, "--evidence", folder];
+    desk.run(&[&fixed, more].concat())
 }
 
 /// Plays every part, and returns their folders: a part without scenarios has none.
@@ -66,11 +66,11 @@ fn cases(desk: &Desk, name: &str) -> Vec<String> {
     let document = roxmltree::Document::parse(&xml).expect("XML");
     let all = document
         .descendants()
-        .filter(|own| own.has_tag_name("testcase"));
-    let cases = all.map(|own| {
-        let what = own.children().find(|inner| inner.is_element());
+        .filter(|node| node.has_tag_name("testcase"));
+    let cases = all.map(|node| {
+        let what = node.children().find(|inner| inner.is_element());
         let what = what.map_or("passed", |inner| inner.tag_name().name());
-        format!("{} {what}", own.attribute("name").unwrap_or_default())
+        format!("{} {what}", node.attribute("name").unwrap_or_default())
     });
     cases.collect()
 }
@@ -165,8 +165,8 @@ fn equal_on_ports(rigs: &[(&str, &str)]) {
             "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\n{port}{limits}"
         ));
         let play = |folder: &str, more: &[&str]| {
-            let own = ["run", "--rig", "desk.toml", "--filter", filter];
-            desk.run(&[&own, more, &["--evidence", folder]].concat())
+            let fixed = ["run", "--rig", "desk.toml", "--filter", filter];
+            desk.run(&[&fixed, more, &["--evidence", folder]].concat())
         };
         let whole = play("whole", &["--keep", "failed"]);
         ended(&desk.run(&["verify", "whole"]), 0, "0 things wrong");

@@ -41,8 +41,8 @@ impl Bench {
     }
 
     fn qualify(&self, folder: &str, more: &[&str]) -> Output {
-        let own = ["qualify", "--rig", "desk.toml", "--evidence", folder];
-        self.desk.run(&[&own, more, self.scenarios].concat())
+        let fixed = ["qualify", "--rig", "desk.toml", "--evidence", folder];
+        self.desk.run(&[&fixed, more, self.scenarios].concat())
     }
 
     /// Qualifies in one piece and in two parts.

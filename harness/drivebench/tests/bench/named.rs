@@ -57,7 +57,7 @@ fn named_on(limits: &str, names: &[&str], scenarios: &[&str]) {
         ended(&output, code, &format!("{name} (ND21 "));
         let line = |line: &str| line.starts_with("deviation") && line.contains(&format!("{name} "));
         let text = said(&output);
-        let line = text.lines().find(|own| line(own)).expect("its name");
+        let line = text.lines().find(|row| line(row)).expect("its name");
         // A ring that cannot be played on any further may not show which drive it is.
         let one_of = line
             .rsplit_once("not known which drive: one of ")

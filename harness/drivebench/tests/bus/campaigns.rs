@@ -163,12 +163,12 @@ fn campaigns_over_telegrams() {
 fn a_campaign_of_single_bits_over_telegrams() {
     let bits = drivebench(&["campaign", "nordac/3.3-single-bits", "--format", "json"]);
     let listed: Value = serde_json::from_str(&stdout(&bits)).expect("JSON");
-    let own = &listed["campaigns"][0];
+    let campaign = &listed["campaigns"][0];
     assert_eq!(
-        (&own["bus"], &own["telegrams"]),
+        (&campaign["bus"], &campaign["telegrams"]),
         (&"nordac".into(), &36.into())
     );
-    assert_eq!(own["cases"].as_array().map(Vec::len), Some(8124));
+    assert_eq!(campaign["cases"].as_array().map(Vec::len), Some(8124));
 }
 
 /// The pairs of a campaign for tools, and every campaign that has none is refused with what to do.
@@ -181,12 +181,12 @@ fn pairs_of_faults_for_tools() {
     let output = drivebench(&["campaign", singles, "--pairs", "--format", "json"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let own = &json["pairs"][0];
+    let pairs = &json["pairs"][0];
     assert_eq!(
-        (&own["faults"], &own["pairs"], &own["played"]),
+        (&pairs["faults"], &pairs["pairs"], &pairs["played"]),
         (&11.into(), &55.into(), &55.into())
     );
-    let byte = &own["counts"][0];
+    let byte = &pairs["counts"][0];
     assert_eq!(byte["apart"], "one byte");
     assert_eq!(byte["classes"]["silent-corruption"], 36);
     for (arguments, expected) in [

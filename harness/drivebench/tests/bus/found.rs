@@ -41,14 +41,14 @@ impl Deviations {
 
     fn scenarios(&self) -> BTreeMap<String, Source> {
         let sources = sources(&[]).expect("built-in scenarios");
-        let own = sources
+        let of_bus = sources
             .into_iter()
-            .filter(|own| own.text.contains(self.bus));
-        let name = |own: &Source| {
-            let name = own.name.rsplit('/').next().unwrap_or_default();
+            .filter(|source| source.text.contains(self.bus));
+        let name = |source: &Source| {
+            let name = source.name.rsplit('/').next().unwrap_or_default();
             name.trim_end_matches(".scn").to_owned()
         };
-        own.map(|own| (name(&own), own)).collect()
+        of_bus.map(|source| (name(&source), source)).collect()
     }
 
     /// The verdict with these lines in the header, and how much was carried.
@@ -67,8 +67,8 @@ impl Deviations {
     /// A header line for every drive of a scenario.
     fn of_all(&self, source: &Source, name: &str) -> String {
         let lines = source.text.lines();
-        let own = |line: &'_ str| Some(line.strip_prefix(self.device)?.trim_start().to_owned());
-        let numbers = lines.filter_map(own);
+        let rest = |line: &'_ str| Some(line.strip_prefix(self.device)?.trim_start().to_owned());
+        let numbers = lines.filter_map(rest);
         let numbers: BTreeSet<_> = numbers
             .filter_map(|rest| rest.split(' ').next().map(str::to_owned))
             .collect();

@@ -131,7 +131,7 @@ fn frames_are_carried_recorded_and_played_back() {
     let carried: Vec<_> = trace.channels[0]
         .frames()
         .iter()
-        .map(|own| own.frame)
+        .map(|frame| frame.frame)
         .collect();
     assert_eq!((trace.stations, carried), (1, frames().to_vec()));
     let [question, other, _] = frames();

@@ -92,8 +92,8 @@ fn like<'r>(line: &Value, record: &'r str) -> &'r str {
         let has = |key: &String| text.contains(&format!("\"{key}\":"));
         fields().filter(|(key, _)| has(key)).count()
     };
-    let own = record.lines().filter(|text| text.starts_with(&kind));
-    own.max_by_key(alike).unwrap_or_default()
+    let same_kind = record.lines().filter(|text| text.starts_with(&kind));
+    same_kind.max_by_key(alike).unwrap_or_default()
 }
 
 /// A value with its fields in the order in which this line has them: the program writes them in no other one.

@@ -72,18 +72,22 @@ pub(crate) fn wrong(xml: &str) -> Vec<String> {
 
 fn element(node: Node<'_, '_>, wrong: &mut Vec<String>) {
     let name = node.tag_name().name();
-    let Some((_, attributes, inner)) = ELEMENTS.iter().find(|(own, ..)| *own == name) else {
+    let Some((_, attributes, inner)) = ELEMENTS.iter().find(|(known, ..)| *known == name) else {
         wrong.push(format!("<{name}> is no element of a report"));
         return;
     };
     let known: Vec<&str> = attributes.split_whitespace().collect();
-    for own in node.attributes() {
-        let fits = |known: &&str| known.trim_start_matches('*') == own.name();
+    for attribute in node.attributes() {
+        let fits = |known: &&str| known.trim_start_matches('*') == attribute.name();
         if !known.iter().any(fits) {
-            wrong.push(format!("<{name}> has no attribute {}", own.name()));
+            wrong.push(format!("<{name}> has no attribute {}", attribute.name()));
         }
-        if !typed(own.name(), own.value()) {
-            wrong.push(format!("{}=\"{}\" in <{name}>", own.name(), own.value()));
+        if !typed(attribute.name(), attribute.value()) {
+            wrong.push(format!(
+                "{}=\"{}\" in <{name}>",
+                attribute.name(),
+                attribute.value()
+            ));
         }
     }
     for needed in known.iter().filter_map(|known| known.strip_prefix('*')) {

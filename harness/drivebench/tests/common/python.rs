@@ -6,7 +6,7 @@ use std::process::Command;
 /// A Python that has these modules and pyserial: that of `DRIVEBENCH_PYTHON`, that of `.ci/tools`, or the system's. Without one, prints that
 /// the test `who` is skipped.
 pub(crate) fn with(modules: &str, who: &str) -> Option<PathBuf> {
-    let own = Path::new(env!("TREE")).join("target/python/bin/python");
+    let installed = Path::new(env!("TREE")).join("target/python/bin/python");
     let given = std::env::var_os("DRIVEBENCH_PYTHON").map(PathBuf::from);
     let imports = |python: &PathBuf| {
         let mut command = Command::new(python);
@@ -14,7 +14,7 @@ pub(crate) fn with(modules: &str, who: &str) -> Option<PathBuf> {
         let output = command.args(["-c", &import]).output();
         output.is_ok_and(|output| output.status.success())
     };
-    let all = given.into_iter().chain([own, "python3".into()]);
+    let all = given.into_iter().chain([installed, "python3".into()]);
     let found = all.into_iter().find(imports);
     crate::debian::told(found.is_some(), &format!("Python with {modules}"), who);
     found

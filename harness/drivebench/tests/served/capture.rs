@@ -84,9 +84,15 @@ fn file(path: &Path) -> Capture {
 }
 
 fn bytes(capture: &Capture) -> Vec<Vec<u8>> {
-    let links = capture.traces.iter().flat_map(|own| &own.channels);
+    let links = capture.traces.iter().flat_map(|trace| &trace.channels);
     links
-        .map(|own| own.octets().iter().filter_map(|own| own.received).collect())
+        .map(|channel| {
+            channel
+                .octets()
+                .iter()
+                .filter_map(|octet| octet.received)
+                .collect()
+        })
         .collect()
 }
 
@@ -216,17 +222,19 @@ fn part(path: &Path, link: &str) -> String {
     let file = std::fs::read(path).expect("a file");
     let read = read_with(&file, &settings).unwrap_or_else(|error| panic!("{error}"));
     let mut text = String::new();
-    for own in read.capture.traces.iter().flat_map(|own| &own.channels) {
-        text += &format!("{:?}:", own.from);
+    for channel in read.capture.traces.iter().flat_map(|trace| &trace.channels) {
+        text += &format!("{:?}:", channel.from);
         text.extend(
-            own.octets()
+            channel
+                .octets()
                 .iter()
-                .map(|own| format!(" {:02X}", own.received.unwrap_or(0))),
+                .map(|octet| format!(" {:02X}", octet.received.unwrap_or(0))),
         );
         text.extend(
-            own.frames()
+            channel
+                .frames()
                 .iter()
-                .map(|own| format!(" {:?} {}", own.from, own.frame)),
+                .map(|frame| format!(" {:?} {}", frame.from, frame.frame)),
         );
         text += "\n";
     }
@@ -286,11 +294,11 @@ fn every_bus_in_one_capture() {
     listener.signal(Signal::TERM);
     let told = adapter.end();
     let (code, said) = listener.end();
-    for own in &told {
-        let known = ["N", "C", "V", "S5", "Z1", "L", "F"].contains(&own.as_str());
-        assert!(known, "the adapter was told {own:?}");
+    for line in &told {
+        let known = ["N", "C", "V", "S5", "Z1", "L", "F"].contains(&line.as_str());
+        assert!(known, "the adapter was told {line:?}");
     }
-    assert_eq!(told.iter().filter(|own| *own == "L").count(), 2);
+    assert_eq!(told.iter().filter(|line| *line == "L").count(), 2);
     assert_eq!(code, Some(5), "{said}");
     assert!(
         said.contains("ring not judged: no tap is on the master"),
@@ -313,7 +321,7 @@ fn every_bus_in_one_capture() {
     ended(&mixed, 2, "frames of CAN (--link \"bus=can0\")");
     let lost = std::fs::read(&file).expect("a file");
     let words = b"frames lost: the adapter's queue was full";
-    assert!(lost.windows(words.len()).any(|own| own == words));
+    assert!(lost.windows(words.len()).any(|part| part == words));
 }
 
 /// An adapter that cannot listen only is refused; so is a server of which that is not known.
@@ -417,10 +425,10 @@ fn wireshark_is_answered() {
         0,
         "interface {value=drivebench-sim}{display=drivebench: simulated ring}\n",
     );
-    let own = ["extcap", "--extcap-interface", "drivebench-sim"];
-    let types = desk.run(&[&own[..], &["--extcap-dlts"]].concat());
+    let command = ["extcap", "--extcap-interface", "drivebench-sim"];
+    let types = desk.run(&[&command[..], &["--extcap-dlts"]].concat());
     ended(&types, 0, "dlt {number=250}{name=RTAC_SERIAL}");
-    let options = desk.run(&[&own[..], &["--extcap-config"]].concat());
+    let options = desk.run(&[&command[..], &["--extcap-config"]].concat());
     ended(
         &options,
         0,
@@ -434,14 +442,14 @@ fn wireshark_is_answered() {
         let interface =
             format!("interface {{value={name}}}{{display=drivebench: simulated {bus}}}\n");
         ended(&listed, 0, &interface);
-        let own = |what: &str| desk.run(&["extcap", "--extcap-interface", &name, what]);
+        let asked = |what: &str| desk.run(&["extcap", "--extcap-interface", &name, what]);
         ended(
-            &own("--extcap-dlts"),
+            &asked("--extcap-dlts"),
             0,
             &format!("dlt {{number={number}}}"),
         );
         ended(
-            &own("--extcap-config"),
+            &asked("--extcap-config"),
             0,
             &format!("{{default={scenario}}}"),
         );
@@ -451,7 +459,7 @@ fn wireshark_is_answered() {
     let pipe = desk.path("pipe");
     for rig in ["sim:x", "sim:400"] {
         let wrong = [
-            &own[..],
+            &command[..],
             &["--capture", "--fifo", name(&pipe), "--rig", rig],
         ]
         .concat();
@@ -461,7 +469,7 @@ fn wireshark_is_answered() {
         ended(&wrong, 3, "1 to 250");
     }
     let other = [
-        &own[..],
+        &command[..],
         &["--capture", "--fifo", name(&pipe)],
         &["--scenario", "nordac-3.3-start-up"],
     ]
@@ -515,8 +523,8 @@ fn every_bus_is_captured_by_extcap() {
         };
         let mut whole = 0;
         while let Some(next) = length(whole)
-            .map(|own| whole + own)
-            .filter(|own| *own <= kept.len())
+            .map(|end| whole + end)
+            .filter(|end| *end <= kept.len())
         {
             whole = next;
         }

@@ -180,7 +180,7 @@ fn scenarios_over(ways: &[&str]) {
         assert!(matches!(code, Some(0 | 5)), "{way}: {}", said(&played));
         assert!(said(&played).contains(SAFE), "{way}: {}", said(&played));
         let passed = String::from_utf8_lossy(&played.stdout).into_owned();
-        let passed = passed.lines().filter(|own| own.starts_with("passed "));
+        let passed = passed.lines().filter(|row| row.starts_with("passed "));
         assert!(passed.count() >= 4, "{way}: {}", said(&played));
         let verify = || desk.command("verify kept").output().expect("the program");
         ended(&verify(), 0, " 0 things wrong");
@@ -214,8 +214,8 @@ fn losing(adapter: &str) -> String {
     let adapter = connect(adapter);
     std::thread::spawn(move || {
         let (client, _) = listener.accept().expect("a client");
-        for own in [&client, &adapter] {
-            own.set_nodelay(true).expect("a socket");
+        for socket in [&client, &adapter] {
+            socket.set_nodelay(true).expect("a socket");
         }
         let (mut to, mut from) = (
             adapter.try_clone().expect("one"),

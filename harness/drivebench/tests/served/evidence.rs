@@ -87,7 +87,7 @@ fn changes_no_verdict(rigs: &[usize]) {
         (&on_can, "unitek-5.1-too-short"),
         (&on_line, "nordac-en-1-fcs"),
     ];
-    for (run, scenarios) in rigs.iter().map(|own| runs[*own]) {
+    for (run, scenarios) in rigs.iter().map(|rig| runs[*rig]) {
         let line = format!("run {scenarios} --allow-motion --rig desk.toml");
         let without = settled(|_| run(&line));
         let with = settled(|time| run(&format!("{line} --evidence kept{time}")));
@@ -107,10 +107,10 @@ fn changes_no_verdict(rigs: &[usize]) {
 /// A computer that stands still makes an attempt inconclusive: the scenarios are then played again, five times at most.
 fn settled(run: impl Fn(usize) -> Output) -> Output {
     let runs = (0..5).map(&run);
-    let mut left = runs.skip_while(|own| {
-        verdicts(own)
+    let mut left = runs.skip_while(|output| {
+        verdicts(output)
             .iter()
-            .any(|own| own.starts_with("inconclusive"))
+            .any(|verdict| verdict.starts_with("inconclusive"))
     });
     left.next().unwrap_or_else(|| run(5))
 }

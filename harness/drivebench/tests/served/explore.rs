@@ -317,7 +317,7 @@ fn nothing_that_is_not_allowed_leaves() {
     let executed = executed(2, &cells);
     let reads = executed
         .iter()
-        .filter(|own| matches!(own[0], 0xC0 | 0xC1 | 0xC7))
+        .filter(|command| matches!(command[0], 0xC0 | 0xC1 | 0xC7))
         .count();
     assert!(reads > 20, "{reads} reads\n{}", said(&output));
     for command in &executed {

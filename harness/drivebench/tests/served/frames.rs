@@ -225,7 +225,7 @@ fn the_bench_s_own_link_talks_to_a_drive() {
         assert_eq!(heard.frame(), Some(CanEvent::Frame(expected)));
         assert!(at <= link.now());
         let trace = link.trace(0);
-        let from = |own: &harness_sim::record::LineFrame| (own.from, own.frame);
+        let from = |frame: &harness_sim::record::LineFrame| (frame.from, frame.frame);
         let carried: Vec<_> = trace.channels[0].frames().iter().map(from).collect();
         assert_eq!(carried, [(None, asked), (Some(1), expected)]);
         drop(link);

@@ -74,8 +74,8 @@ impl Desk {
     fn permit(&self, more: &[&str]) {
         let path = self.path("desk.toml");
         let mut text = std::fs::read_to_string(&path).expect("a rig");
-        for own in more {
-            text += &format!("allow_{own} = true\n");
+        for limit in more {
+            text += &format!("allow_{limit} = true\n");
         }
         std::fs::write(&path, text).expect("room");
     }
@@ -125,7 +125,7 @@ impl Desk {
 /// A half-duplex adapter in front of a served line: it gives back what it is sent.
 fn hears_itself(line: String) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let own = listener.local_addr().expect("an address").to_string();
+    let address = listener.local_addr().expect("an address").to_string();
     std::thread::spawn(move || {
         while let Ok((mut bench, _)) = listener.accept() {
             let mut line = TcpStream::connect(&line).expect("it is served");
@@ -152,7 +152,7 @@ fn hears_itself(line: String) -> String {
             let _closed = line.shutdown(std::net::Shutdown::Both);
         }
     });
-    own
+    address
 }
 
 /// A right slave passes what it is asked over every way in, ends in its safe state, and the record bears the verdicts out.
@@ -175,7 +175,7 @@ fn scenarios_over(ways: &[(&str, &str)]) {
         assert!(matches!(code, Some(0 | 5)), "{way}: {}", said(&played));
         assert!(said(&played).contains(SAFE), "{way}: {}", said(&played));
         let text = String::from_utf8_lossy(&played.stdout).into_owned();
-        let passed = text.lines().filter(|own| own.starts_with("passed "));
+        let passed = text.lines().filter(|row| row.starts_with("passed "));
         assert!(passed.count() >= 2, "{way}: {}", said(&played));
         ended(&desk.run("verify kept"), 0, " 0 things wrong");
         let record = desk.path("kept/run.jsonl");
@@ -209,7 +209,7 @@ fn inverters_behind_an_adapter_are_explored() {
     let text = said(&found);
     let line = text
         .lines()
-        .find_map(|own| own.split_once("drivebench shrink "));
+        .find_map(|row| row.split_once("drivebench shrink "));
     let (_, finding) = line.expect("a finding");
     let small = desk.run(&format!(
         "shrink {finding} --rig desk.toml --allow-motion --runs 5"
@@ -338,7 +338,7 @@ fn switched_settings_are_set_back(signal: &str) {
     // The wait has begun when the record has the reply of the scenario, behind what switches the settings.
     while !desk.path("state/desk.left").exists()
         || !std::fs::read_to_string(desk.path("kept/run.jsonl"))
-            .is_ok_and(|own| own.contains("0970"))
+            .is_ok_and(|record| record.contains("0970"))
     {
         assert!(Instant::now() < end, "the scenario does not begin");
         std::thread::sleep(Duration::from_millis(50));
@@ -360,7 +360,7 @@ fn switched_settings_are_set_back(signal: &str) {
         );
         let command = next
             .split('`')
-            .find(|own| own.starts_with("drivebench write 8 "));
+            .find(|word| word.starts_with("drivebench write 8 "));
         let command = command.expect("what puts it back");
         let program = env!("CARGO_BIN_EXE_drivebench");
         let mut shell = Command::new("sh");
@@ -407,7 +407,7 @@ fn without_the_eeprom_no_scenario_fails() {
     let text = said(&played);
     let verdicts = |verdict: &str| {
         let named = format!("{verdict} nordac-3.3-transition");
-        text.lines().filter(|own| own.starts_with(&named)).count()
+        text.lines().filter(|row| row.starts_with(&named)).count()
     };
     assert_eq!(verdicts("failed"), 0, "{text}");
     assert!(verdicts("passed") > 0, "{text}");
@@ -417,7 +417,7 @@ fn without_the_eeprom_no_scenario_fails() {
         _ => 5,
     };
     let denied = "needs `allow_eeprom` in the rig's [limits]";
-    let denials = text.lines().filter(|own| own.contains(denied)).count();
+    let denials = text.lines().filter(|row| row.contains(denied)).count();
     assert!(denials > 0, "{text}");
     let more = format!("`allow_eeprom` in [limits] ({denials})");
     ended(&played, code, &more);

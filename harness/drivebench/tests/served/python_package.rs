@@ -12,8 +12,8 @@ fn package() -> PathBuf {
 fn python(python: impl AsRef<Path>, words: &[&str]) -> Command {
     let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let own = program.parent().map(Path::to_owned);
-    let folders = own.into_iter().chain(std::env::split_paths(&path));
+    let folder = program.parent().map(Path::to_owned);
+    let folders = folder.into_iter().chain(std::env::split_paths(&path));
     let mut command = Command::new(python.as_ref());
     command
         .args(words)

@@ -60,7 +60,7 @@ fn an_inverter_behind_ser2net() {
     let (_ser2net, address) = in_front_of(&desk.path("terminal"), "19200e81");
     let file = desk.path("desk.toml");
     let text = std::fs::read_to_string(&file).expect("a rig");
-    let serial = text.lines().find(|own| own.starts_with("serial = "));
+    let serial = text.lines().find(|line| line.starts_with("serial = "));
     let behind = format!("transport = \"rfc2217\"\nport = \"{address}\"");
     let text = text.replace(serial.expect("a port"), &behind);
     std::fs::write(&file, text).expect("room");

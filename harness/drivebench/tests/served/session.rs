@@ -139,7 +139,7 @@ fn a_session_holds_the_bench_and_ends_in_the_safe_state() {
     let of = |id: u64| {
         answers
             .iter()
-            .find(|own| own["id"] == id)
+            .find(|answer| answer["id"] == id)
             .expect("an answer")
     };
     assert_eq!(code_of(of(4)), 130, "{answers:?}");
@@ -164,7 +164,7 @@ fn a_signal_ends_a_session_in_the_safe_state() {
     let killed = Command::new("kill")
         .args(["-TERM", &session.child.id().to_string()])
         .status();
-    assert!(killed.is_ok_and(|own| own.success()));
+    assert!(killed.is_ok_and(|status| status.success()));
     let (last, output) = session.end();
     assert_eq!(
         (&last["event"], &last["code"]),
@@ -192,9 +192,9 @@ fn go_is_a_word_of_every_bus() {
         let go = session.ask(&json!({"id": 1, "do": "go", "drive": drive}));
         assert!(go.get("result").is_some(), "{rig}: {go}");
         let state = session.ask(&json!({"id": 2, "do": "state", "drive": drive}));
-        let own = state["result"]["data"]["drives"][0][key].to_string();
+        let value = state["result"]["data"]["drives"][0][key].to_string();
         assert!(
-            own.trim_matches('"').starts_with(released),
+            value.trim_matches('"').starts_with(released),
             "{rig}: {state}"
         );
         let start = session.ask(&json!({"id": 3, "do": "exchange", "drive": drive}));
@@ -247,8 +247,8 @@ fn a_capture_of_a_port() {
     let bytes = std::fs::read(desk.path("ring.pcapng")).expect("a file");
     // The first packet of the file, behind the section and three interfaces of a ring of two drives.
     let mut rest = &bytes[..];
-    let word = |own: &[u8], at: usize| {
-        u32::from_le_bytes([own[at], own[at + 1], own[at + 2], own[at + 3]])
+    let word = |block: &[u8], at: usize| {
+        u32::from_le_bytes([block[at], block[at + 1], block[at + 2], block[at + 3]])
     };
     while word(rest, 0) != 6 {
         rest = &rest[word(rest, 4) as usize..];
@@ -319,7 +319,10 @@ fn scenarios_on_ports_of_other_buses() {
         std::thread::sleep(std::time::Duration::from_secs(3));
         session.send(br#"{"id":5,"do":"cancel","of":4}"#);
         let answers = [session.answer(), session.answer()];
-        assert!(answers.iter().any(|own| own["id"] == 5), "{answers:?}");
+        assert!(
+            answers.iter().any(|answer| answer["id"] == 5),
+            "{answers:?}"
+        );
         let read = session.ask(&json!({"id": 6, "do": "read", "drive": drive, "cells": [cell]}));
         assert!(read.get("result").is_some(), "{read}");
         let (last, output) = session.end();

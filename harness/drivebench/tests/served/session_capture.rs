@@ -36,13 +36,13 @@ fn a_long_session_needs_no_memory() {
         &mut session,
         &json!({"id": 1, "do": "capture", "path": "long.pcapng"}),
     );
-    let size = |desk: &Desk| std::fs::metadata(desk.path("long.pcapng")).map(|own| own.len());
+    let size = |desk: &Desk| std::fs::metadata(desk.path("long.pcapng")).map(|file| file.len());
     let mut sizes = vec![size(&desk).expect("a file")];
     for _ in 0..2 {
         done(&mut session, &wait);
         sizes.push(size(&desk).expect("a file"));
     }
-    assert!(sizes.is_sorted_by(|own, next| own + 40 * BYTES_A_MINUTE < *next));
+    assert!(sizes.is_sorted_by(|size, next| size + 40 * BYTES_A_MINUTE < *next));
     let more = session.peak().expect("a process") - before;
     assert!(more < 16 << 10, "{more} KiB more");
     let captured = done(&mut session, &json!({"id": 1, "do": "capture-end"}));
@@ -60,10 +60,10 @@ fn a_long_session_needs_no_memory() {
 #[test]
 fn a_capture_on_a_full_disk() {
     let desk = desk();
-    let own = desk.command(&["shell", "--json", "--rig", "sim:3"]);
+    let session = desk.command(&["shell", "--json", "--rig", "sim:3"]);
     let mut command = std::process::Command::new("sh");
     command.args(["-c", "ulimit -f 1000; exec \"$@\"", "sh"]);
-    command.arg(own.get_program()).args(own.get_args());
+    command.arg(session.get_program()).args(session.get_args());
     command.current_dir(desk.path(""));
     let mut child = command
         .stdin(Stdio::piped())

@@ -35,7 +35,7 @@ fn lines_of_nonsense() {
     });
     let noise: Vec<u8> = noise.filter(|byte| *byte != b'\n').take(5_000).collect();
     let deep = |open: &str, close: &str| {
-        let [open, close] = [open, close].map(|own| own.repeat(100_000));
+        let [open, close] = [open, close].map(|part| part.repeat(100_000));
         format!(r#"{{"id":1,"do":"cancel","of":{open}0{close}}}"#).into_bytes()
     };
     let named = |name: &[u8]| [br#"{"id":1,"do":""#, name, br#""}"#].concat();

@@ -37,16 +37,16 @@ fn no_bus_imports_another() {
         &["nordac", "profibus"],
         &["toy"],
     ];
-    for own in buses {
+    for bus in buses {
         for place in ["proto/src/*", "sim/src/*", "*/src"] {
-            let folders = own
+            let folders = bus
                 .iter()
                 .map(|name| format!("harness/{}", place.replace('*', name)));
             let folders = folders.filter(|folder| root().join(folder).is_dir());
             for source in folders.flat_map(|folder| files(&folder, "rs")) {
                 for (number, line) in read(&source).lines().enumerate() {
                     let code = line.split("//").next().unwrap_or_default();
-                    let others = buses.iter().filter(|other| **other != own);
+                    let others = buses.iter().filter(|other| **other != bus);
                     let imported = others.copied().flatten().find(|other| {
                         let mut paths = ["buses", "harness_proto", "harness_sim", "crate"].iter();
                         paths.any(|path| code.contains(&format!("{path}::{other}")))

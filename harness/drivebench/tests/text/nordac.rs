@@ -33,7 +33,7 @@ fn traces_for_wireshark() {
     let kinds: Vec<_> = blocks.iter().map(|(kind, _)| *kind).collect();
     assert_eq!(kinds, [0x0A0D_0D0A, 1, 1, 6, 6, 6]);
     let has =
-        |block: usize, text: &[u8]| blocks[block].1.windows(text.len()).any(|own| own == text);
+        |block: usize, text: &[u8]| blocks[block].1.windows(text.len()).any(|part| part == text);
     assert!(has(1, b"master") && has(2, b"slave 8"));
     // Behind 28 bytes of the block and 8 of time: the event, and behind three zeros the octets.
     let event = |block: usize| blocks[block].1[36];

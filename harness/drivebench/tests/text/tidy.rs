@@ -195,8 +195,8 @@ fn rooms_import_from_rooms_in_front_of_them() {
             let inner = source.strip_prefix(&base).expect("inside");
             let inner = inner.display().to_string();
             let room = inner.split(['/', '.']).next().expect("a name").to_owned();
-            let own = place(rooms, &room);
-            let own = own.unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
+            let at = place(rooms, &room);
+            let at = at.unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
             let text = read(&source);
             let lines = text.lines().enumerate().filter(|_| room != "lib");
             for (number, line) in lines {
@@ -210,7 +210,7 @@ fn rooms_import_from_rooms_in_front_of_them() {
                         .take_while(|c| c.is_alphanumeric() || *c == '_')
                         .collect();
                     let in_front = match place(rooms, &name) {
-                        Some(other) => other <= own,
+                        Some(other) => other <= at,
                         None => place(below, &name).is_some(),
                     };
                     assert!(
@@ -249,7 +249,7 @@ fn the_page_on_a_fourth_bus_holds() {
     for name in names {
         let declared = [" ", ":", "<"].map(|end| format!("trait {name}{end}"));
         assert!(
-            declared.iter().any(|own| sources.contains(own)),
+            declared.iter().any(|words| sources.contains(words)),
             "there is no trait {name}"
         );
     }
@@ -297,8 +297,8 @@ fn a_name_is_one_type() {
                 let end = rest
                     .find(|c: char| !c.is_alphanumeric())
                     .unwrap_or(rest.len());
-                let own = declared.entry(rest[..end].to_owned()).or_default();
-                own.entry(bus).or_default().insert(path.clone());
+                let buses = declared.entry(rest[..end].to_owned()).or_default();
+                buses.entry(bus).or_default().insert(path.clone());
             }
         }
     }
@@ -341,8 +341,8 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
     tests.push(root().join("scripts/freeze"));
     let tests: String = tests.iter().map(|path| read(path)).collect();
     let endings = ["snap", "txt", "json", "svg"];
-    for path in endings.map(|own| files("snapshots", own)).concat() {
-        let own = name(&path, "snapshots");
+    for path in endings.map(|ending| files("snapshots", ending)).concat() {
+        let named_file = name(&path, "snapshots");
         let named = ["scenarios/", "campaigns/"];
         let file = path
             .file_name()
@@ -350,7 +350,7 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
             .expect("a name");
         let literal =
             ["\"", "/"].map(|before| format!("{before}{}\"", file.trim_end_matches(".snap")));
-        let compared = named.iter().any(|folder| own.starts_with(folder))
+        let compared = named.iter().any(|folder| named_file.starts_with(folder))
             || literal.iter().any(|literal| tests.contains(literal));
         assert!(compared, "no test compares snapshots/{file}");
     }
@@ -424,8 +424,11 @@ fn every_property_is_exercised_and_described() {
         .map(|path| read(path))
         .collect();
     let bus = &harness_proto::novobus::properties::PROPERTIES;
-    let own = &harness_sim::nd21::PROPERTIES;
-    let names = bus.iter().map(|p| p.name).chain(own.iter().map(|p| p.name));
+    let drive = &harness_sim::nd21::PROPERTIES;
+    let names = bus
+        .iter()
+        .map(|p| p.name)
+        .chain(drive.iter().map(|p| p.name));
     for name in names {
         assert!(page.contains(&format!("| `{name}` |")), "{name}");
         let set = format!("property {name} =");
@@ -551,7 +554,7 @@ const TELL_TALE: [(&str, usize); 12] = [
 
 #[test]
 fn prose_is_plain() {
-    let own = ["harness/drivebench/tests/text/tidy.rs"].map(|path| root().join(path));
+    let excused = ["harness/drivebench/tests/text/tidy.rs"].map(|path| root().join(path));
     let sources = ["harness", "fuzz/src", "fuzz/fuzz_targets"]
         .iter()
         .flat_map(|top| files(top, "rs"));
@@ -568,7 +571,7 @@ fn prose_is_plain() {
     for path in sources
         .chain(pages)
         .chain(top)
-        .filter(|path| !own.contains(path))
+        .filter(|path| !excused.contains(path))
     {
         let code = path.extension().is_some_and(|e| e == "rs");
         for (number, line) in read(&path).lines().enumerate() {

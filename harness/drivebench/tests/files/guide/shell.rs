@@ -27,8 +27,8 @@ fn module(mode: &Mode) -> Option<&'static str> {
     let Mode::Needs(tool) = mode else {
         return None;
     };
-    let own = PYTHON.iter().find(|(package, _)| package == tool);
-    own.map(|(_, module)| *module)
+    let python = PYTHON.iter().find(|(package, _)| package == tool);
+    python.map(|(_, module)| *module)
 }
 
 /// Where the two streams of a command go.
@@ -153,9 +153,9 @@ fn one(command: &str, number: usize, streams: Streams) -> String {
 /// `python3` is that one, where it is given.
 fn run(home: &Path, python: Option<&Path>) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let own = python.and_then(Path::parent).map(Path::to_owned);
+    let folder = python.and_then(Path::parent).map(Path::to_owned);
     let folders =
-        (std::iter::once(home.join("bin")).chain(own)).chain(std::env::split_paths(&path));
+        (std::iter::once(home.join("bin")).chain(folder)).chain(std::env::split_paths(&path));
     let mut child = Command::new("sh")
         .arg("script")
         .current_dir(home)

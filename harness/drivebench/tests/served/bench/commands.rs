@@ -163,8 +163,8 @@ fn an_interrupted_command_ends_in_the_safe_state() {
             "{samples}"
         );
         let folder = std::fs::read_dir(desk.folder.path()).expect("a folder");
-        let part = folder.filter_map(Result::ok).find(|own| {
-            let name = own.file_name();
+        let part = folder.filter_map(Result::ok).find(|entry| {
+            let name = entry.file_name();
             name.to_string_lossy().ends_with(".part")
         });
         assert!(part.is_none(), "{part:?}");

@@ -103,7 +103,7 @@ fn a_tap_on_a_pseudo_terminal_gives_its_bytes() {
         for link in 0..4 {
             let bytes = &capture["links"][link]["bytes"];
             assert!(
-                bytes.as_array().is_some_and(|own| !own.is_empty()),
+                bytes.as_array().is_some_and(|list| !list.is_empty()),
                 "{link}"
             );
         }

@@ -28,10 +28,10 @@ fn edit(desk: &Desk, from: &str, to: &str) {
 
 /// The program with SIGHUP not ignored, whatever the parent of the tests does.
 fn heeding(desk: &Desk, arguments: &[&str]) -> Command {
-    let own = desk.command(arguments);
+    let program = desk.command(arguments);
     let mut command = Command::new("env");
     command.arg("--default-signal=HUP");
-    command.arg(own.get_program()).args(own.get_args());
+    command.arg(program.get_program()).args(program.get_args());
     command.env("DRIVEBENCH_STATE", desk.path("state"));
     command.stdin(Stdio::null());
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -191,9 +191,9 @@ fn interrupted_while_it_waits_for_the_rig() {
 fn a_signal_that_the_parent_ignores_is_ignored() {
     let (_served, desk) = desk(true);
     let watch = ["watch", "0", "nist", "--for", "100s"];
-    let own = desk.command(&watch);
+    let program = desk.command(&watch);
     let mut command = Command::new("nohup");
-    command.arg(own.get_program()).args(own.get_args());
+    command.arg(program.get_program()).args(program.get_args());
     command.env("DRIVEBENCH_STATE", desk.path("state"));
     command.stdin(Stdio::null());
     command.stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -54,15 +54,15 @@ fn shows(seen: &Seen, words: &str) -> bool {
 
 #[test]
 fn every_key_is_obeyed_on_every_bus() {
-    for own in BUSES {
-        let mut tty = top(own.rig);
-        let [name, row] = own.second;
-        let seen = tty.see("two drives", |seen| shows(seen, own.states));
+    for drives in BUSES {
+        let mut tty = top(drives.rig);
+        let [name, row] = drives.second;
+        let seen = tty.see("two drives", |seen| shows(seen, drives.states));
         assert!(!seen.cursor && tty.is_raw());
         tty.see("time and traffic", |seen| {
             !seen.has("00:00:00") && seen.has("s/s, ") && seen.has(" 0 damaged")
         });
-        let drive = own.drive;
+        let drive = drives.drive;
         for (keys, words) in [
             (format!("/{row}\r"), "1-1 of 1".to_owned()),
             ("/\x1b".to_owned(), "1-2 of 2".to_owned()),
@@ -76,22 +76,22 @@ fn every_key_is_obeyed_on_every_bus() {
         }
         tty.keys(&format!("\x7f{name}\r"));
         tty.see("the stop", |seen| {
-            own.stopped.iter().all(|words| seen.has(words)) && !seen.has("paused")
+            drives.stopped.iter().all(|words| seen.has(words)) && !seen.has("paused")
         });
         tty.keys("c");
-        tty.see("no message", |seen| !seen.has(own.stopped[1]));
+        tty.see("no message", |seen| !seen.has(drives.stopped[1]));
         tty.keys("q");
-        assert_eq!(tty.ended().code(), Some(0), "{}", own.rig);
+        assert_eq!(tty.ended().code(), Some(0), "{}", drives.rig);
         tty.is_as_before();
     }
 }
 
 #[test]
 fn every_interruption_leaves_the_terminal_as_it_was() {
-    for own in BUSES {
+    for drives in BUSES {
         for how in ["key", "SIGTERM", "closed"] {
-            let mut tty = top(own.rig);
-            tty.see("two drives", |seen| shows(seen, own.states));
+            let mut tty = top(drives.rig);
+            tty.see("two drives", |seen| shows(seen, drives.states));
             match how {
                 "key" => tty.keys("\x03"),
                 "SIGTERM" => signal(&tty, Signal::TERM),
@@ -100,7 +100,7 @@ fn every_interruption_leaves_the_terminal_as_it_was() {
                     signal(&tty, Signal::HUP);
                 }
             }
-            assert_eq!(tty.ended().code(), Some(130), "{}: {how}", own.rig);
+            assert_eq!(tty.ended().code(), Some(130), "{}: {how}", drives.rig);
             if how != "closed" {
                 tty.is_as_before();
             }
@@ -182,22 +182,22 @@ fn a_silent_drive_does_not_end_the_view_of_a_port() {
 /// Without a terminal that can move its cursor nothing but a refusal is printed, and `--once` prints what it did before there were keys.
 #[test]
 fn plain_output_has_no_escape_codes() {
-    for own in BUSES {
-        let arguments = ["TERM=dumb", PROGRAM, "top", "--rig", own.rig];
+    for drives in BUSES {
+        let arguments = ["TERM=dumb", PROGRAM, "top", "--rig", drives.rig];
         let mut tty = Tty::start(in_session(Path::new("env"), &arguments));
         assert_eq!(tty.ended().code(), Some(2));
         tty.see("the refusal", |seen| seen.first.contains("top --once"));
         assert!(!tty.written().contains("\x1b[?"), "{}", tty.written());
         for (more, code) in [(&[][..], 2), (&["--once"], 0)] {
             let mut command = Command::new(PROGRAM);
-            command.args(["top", "--rig", own.rig]).args(more);
+            command.args(["top", "--rig", drives.rig]).args(more);
             let output = command.stdin(Stdio::null()).output().expect("the program");
             let shown = String::from_utf8_lossy(&output.stdout).into_owned();
             assert_eq!(output.status.code(), Some(code), "{shown}");
             assert!(!shown.contains('\x1b'), "{shown}");
             let lines = if code == 0 { 3 } else { 0 };
             assert_eq!(shown.lines().count(), lines, "{shown}");
-            assert!(shown.is_empty() || shown.starts_with(own.drive), "{shown}");
+            assert!(shown.is_empty() || shown.starts_with(drives.drive), "{shown}");
         }
     }
 }

@@ -250,9 +250,9 @@ fn a_panic_leaves_the_terminal_as_it_was_and_its_message_to_be_read() {
         screen.draw(&mut top).expect("drawn");
         panic!("out of order");
     }
-    let own = std::env::current_exe().expect("this program");
+    let program = std::env::current_exe().expect("this program");
     let name = "top::terminal::a_panic_leaves_the_terminal_as_it_was_and_its_message_to_be_read";
-    let mut again = in_session(&own, &[name, "--exact", "--nocapture"]);
+    let mut again = in_session(&program, &[name, "--exact", "--nocapture"]);
     again.env(OWN, "1");
     let mut tty = Tty::start(again);
     assert_ne!(tty.ended().code(), Some(0));

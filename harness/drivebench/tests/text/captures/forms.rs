@@ -72,13 +72,13 @@ fn elements(text: &str) -> Vec<(String, String)> {
             }
             Event::End(_) => closed.push(open.pop().expect("an open element")),
             Event::Text(text) => {
-                if let Some((_, own)) = open.last_mut() {
-                    own.push_str(&text.decode().expect("text"));
+                if let Some((_, inner)) = open.last_mut() {
+                    inner.push_str(&text.decode().expect("text"));
                 }
             }
             Event::GeneralRef(name) => {
-                if let Some((_, own)) = open.last_mut() {
-                    own.push_str(&format!("&{};", String::from_utf8_lossy(&name)));
+                if let Some((_, inner)) = open.last_mut() {
+                    inner.push_str(&format!("&{};", String::from_utf8_lossy(&name)));
                 }
             }
             Event::Eof => break,
@@ -198,7 +198,7 @@ fn the_dump_of_a_line_is_read_back() {
         .collect();
     assert_eq!(read, expected);
     for status in ["parity", "framing", "break"] {
-        assert!(read.iter().any(|(_, own)| *own == status), "{status}");
+        assert!(read.iter().any(|(_, read)| *read == status), "{status}");
     }
 }
 

@@ -107,7 +107,7 @@ fn every_advised_command_leads_to_a_capture() {
         let (code, said) = import(&folder.join(format!("FILE.{ending}")));
         assert_eq!(code, Some(2), "{ending}: {said}");
         let advice = said.split('`').skip(1).step_by(2);
-        let mut advice = advice.filter(|own| own.contains(&format!("FILE.{ending}")));
+        let mut advice = advice.filter(|command| command.contains(&format!("FILE.{ending}")));
         let advice = advice
             .next()
             .unwrap_or_else(|| panic!("{ending}: no command in {said}"));

@@ -8,7 +8,7 @@ fn drawn(dump: &str, wire: &str, bit: u64) -> Vec<u8> {
     let code = dump
         .lines()
         .find_map(|line| line.strip_suffix(&format!(" {wire} $end")));
-    let code = code.and_then(|own| own.rsplit(' ').next()).expect("a wire");
+    let code = code.and_then(|row| row.rsplit(' ').next()).expect("a wire");
     let mut now = 0;
     let mut changes = Vec::new();
     for line in dump.lines() {
@@ -23,8 +23,8 @@ fn drawn(dump: &str, wire: &str, bit: u64) -> Vec<u8> {
         changes
             .iter()
             .rev()
-            .find(|own| own.0 <= at)
-            .map_or(1, |own| own.1)
+            .find(|change| change.0 <= at)
+            .map_or(1, |change| change.1)
     };
     let mut octets = Vec::new();
     let mut free = 0;

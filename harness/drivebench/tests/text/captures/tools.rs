@@ -46,9 +46,15 @@ fn what_sigrok_writes_is_read() {
         };
         let again = read(text.as_bytes(), None).unwrap_or_else(|error| panic!("{form}: {error}"));
         let received = |capture: &Capture| -> Vec<Vec<Option<u8>>> {
-            let links = capture.traces.iter().flat_map(|own| &own.channels);
+            let links = capture.traces.iter().flat_map(|trace| &trace.channels);
             links
-                .map(|own| own.octets().iter().map(|own| own.received).collect())
+                .map(|channel| {
+                    channel
+                        .octets()
+                        .iter()
+                        .map(|octet| octet.received)
+                        .collect()
+                })
                 .collect()
         };
         assert_eq!(received(&again), received(&capture), "{form}");
@@ -169,11 +175,11 @@ fn dissected(name: &str, capture: &Capture) -> Option<Vec<String>> {
 }
 
 /// The same rows from our own reading; a capture that was read back has no marks, as the dissector has none.
-fn own(capture: &Capture) -> Vec<String> {
+fn our_rows(capture: &Capture) -> Vec<String> {
     let capture = read(&pcapng(capture), None).expect("a capture");
     let rows = written(&capture, FileForm::Csv, "");
     let text = String::from_utf8(rows).expect("text");
-    let mut own = Vec::new();
+    let mut ours = Vec::new();
     let mut lost: BTreeMap<String, usize> = BTreeMap::new();
     for row in text.lines().skip(1) {
         let mut columns: Vec<&str> = row.split(',').collect();
@@ -196,11 +202,11 @@ fn own(capture: &Capture) -> Vec<String> {
             continue;
         }
         let number = columns[3].parse::<usize>().expect("a number") - *lost;
-        own.push(format!(
+        ours.push(format!(
             "{at},{link},{number},{byte},{status},{role},{drive},{cell}"
         ));
     }
-    own
+    ours
 }
 
 #[test]
@@ -217,12 +223,12 @@ fn tshark_reads_packets_and_telegrams() {
         let Some(rows) = dissected(name, &capture) else {
             return;
         };
-        let own = own(&capture);
+        let ours = our_rows(&capture);
         let first = rows
             .iter()
-            .zip(&own)
+            .zip(&ours)
             .position(|(theirs, ours)| theirs != ours);
-        let shown = first.map(|place| (&rows[place], &own[place]));
-        assert_eq!((shown, rows.len()), (None, own.len()), "{name}");
+        let shown = first.map(|place| (&rows[place], &ours[place]));
+        assert_eq!((shown, rows.len()), (None, ours.len()), "{name}");
     }
 }

@@ -23,9 +23,9 @@ const SAID: &str = "document.querySelector('.ring .said').textContent";
 
 /// The browser with the page of the parity error of ND21 9.7, its diagram ready.
 fn opened(name: &str) -> Option<Browser> {
-    let own = folder(name);
-    let mut browser = Browser::start(&own.join("profile"))?;
-    let file = own.join("page.html");
+    let home = folder(name);
+    let mut browser = Browser::start(&home.join("profile"))?;
+    let file = home.join("page.html");
     std::fs::write(
         &file,
         page(&[("9.7-parity-error", text("9.7-parity-error"))]),
@@ -149,11 +149,11 @@ fn bytes_stand_at_their_times() {
 /// A telephone's width holds the page; `next` goes to the byte that differs; Escape closes what is shown of it; a search leaves the rows that fit.
 #[test]
 fn a_narrow_page_next_and_a_search() {
-    let own = folder("narrow");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("narrow");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let file = own.join("page.html");
+    let file = home.join("page.html");
     let names = ["9.2-synco", "9.7-parity-error", "9.8-check-sequence"];
     let others = names.map(|name| (name, text(name)));
     let all = [&[("fails", FAILS.to_owned())], &others[..]].concat();
@@ -163,25 +163,25 @@ fn a_narrow_page_next_and_a_search() {
     ready(&mut browser, &file);
     let width = browser.value("document.documentElement.scrollWidth");
     assert!(width.as_u64() <= Some(390), "{width}");
-    browser.value("[...document.querySelector('.ring .tools').querySelectorAll('button')].find((own) => own.textContent === 'next').click()");
+    browser.value("[...document.querySelector('.ring .tools').querySelectorAll('button')].find((button) => button.textContent === 'next').click()");
     let said = browser.text(SAID);
     assert!(said.starts_with("The first byte that differs. "), "{said}");
     browser.until(&format!("({TIP}) !== ''"));
     browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape' }))");
     assert_eq!(browser.text(TIP), "");
     browser.value("(() => { const find = document.querySelector('.find'); find.value = '9.7-parity'; find.dispatchEvent(new Event('input')); })()");
-    let rows = browser.value("[...document.querySelectorAll('table.rows tbody tr')].filter((own) => own.offsetHeight > 0).length");
+    let rows = browser.value("[...document.querySelectorAll('table.rows tbody tr')].filter((row) => row.offsetHeight > 0).length");
     assert_eq!(rows, json!(1));
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
 #[test]
 fn light_dark_print_and_without_scripts() {
-    let own = folder("looks");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("looks");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let file = own.join("page.html");
+    let file = home.join("page.html");
     std::fs::write(
         &file,
         page(&[
@@ -229,11 +229,11 @@ fn light_dark_print_and_without_scripts() {
 /// The map of a campaign: its cells have a size, a colour for each outcome, and say to the pointer what happened.
 #[test]
 fn the_map_of_a_campaign() {
-    let own = folder("map");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("map");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let file = own.join("page.html");
+    let file = home.join("page.html");
     let output = drivebench(&["campaign", "9.9-silence", "--html", path(&file)]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     browser.open(&file);
@@ -254,11 +254,11 @@ fn the_map_of_a_campaign() {
 /// The page of a fuzzing finding has the picture, and the arrow keys read out its bytes.
 #[test]
 fn the_page_of_a_finding() {
-    let own = folder("finding");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("finding");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let (_run, file) = finding(&own);
+    let (_run, file) = finding(&home);
     ready(&mut browser, &file);
     browser.value("document.querySelector('.ring .scroll').focus()");
     browser.press("ArrowRight");

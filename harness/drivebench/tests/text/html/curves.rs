@@ -15,16 +15,16 @@ const RECORDING: &str =
 
 #[test]
 fn a_cursor_tells_samples_to_pointer_and_keys() {
-    let own = folder("curves");
-    let recording = own.join("r.csv");
+    let home = folder("curves");
+    let recording = home.join("r.csv");
     std::fs::write(&recording, RECORDING).expect("a file");
-    let (page, picture) = (own.join("r.html"), own.join("r.svg"));
+    let (page, picture) = (home.join("r.html"), home.join("r.svg"));
     for file in [&page, &picture] {
         let output = drivebench(&["plot", path(&recording), "--output", path(file)]);
         assert_eq!(output.status.code(), Some(0), "{output:?}");
     }
     sound(&parse(&std::fs::read_to_string(&page).expect("a page")));
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
     browser.open(&page);

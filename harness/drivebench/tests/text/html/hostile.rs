@@ -35,13 +35,13 @@ fn page() -> String {
         for record in &mut outcome.records {
             record.name = (*text).to_owned();
         }
-        let own = format!("{text}\n{calm}");
+        let shown = format!("{text}\n{calm}");
         let played = ScenarioView {
             name: text,
             title: text,
             sources: &[(*text).to_owned()],
             drives: text,
-            text: &own,
+            text: &shown,
             outcome: &outcome,
             traces: &traces,
             report: super::BUS.report,
@@ -86,16 +86,16 @@ fn a_strict_reader_finds_nothing_but_text() {
 
 #[test]
 fn a_browser_runs_nothing_of_it() {
-    let own = folder("hostile");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("hostile");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let file = own.join("page.html");
+    let file = home.join("page.html");
     std::fs::write(&file, page()).expect("a file");
     browser.open(&file);
     browser.until("document.readyState === 'complete'");
     let seen = browser.value(
-        "(() => { let handlers = 0; for (const own of document.querySelectorAll('*')) for (const { name } of own.attributes) handlers += name.startsWith('on');
+        "(() => { let handlers = 0; for (const element of document.querySelectorAll('*')) for (const { name } of element.attributes) handlers += name.startsWith('on');
            return [typeof window.hacked, handlers, document.querySelectorAll('img,iframe,base,object,embed,link,form').length,
                    document.querySelectorAll('script:not([type])').length, document.title]; })()",
     );
@@ -114,11 +114,11 @@ fn a_browser_runs_nothing_of_it() {
 /// A script that is not the page's own would not run, even if it came into the page.
 #[test]
 fn the_policy_keeps_other_scripts_out() {
-    let own = folder("policy");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+    let home = folder("policy");
+    let Some(mut browser) = Browser::start(&home.join("profile")) else {
         return;
     };
-    let file = own.join("page.html");
+    let file = home.join("page.html");
     let broken = page().replacen(
         "<main",
         "<script>window.hacked = 1</script><img src=\"http://127.0.0.1:9/x.png\"><main",
@@ -132,7 +132,7 @@ fn the_policy_keeps_other_scripts_out() {
     assert!(
         complaints
             .iter()
-            .all(|own| own.contains("Content Security Policy")),
+            .all(|complaint| complaint.contains("Content Security Policy")),
         "{complaints:?}"
     );
 }

@@ -50,7 +50,7 @@ fn a_fault_is_injected_by_keys_and_its_address_arrives() {
         browser.text("document.querySelector('#link').textContent"),
         "Live."
     );
-    browser.value("[...document.querySelectorAll('#rows thead button')].find((own) => own.textContent === '2->1').focus()");
+    browser.value("[...document.querySelectorAll('#rows thead button')].find((button) => button.textContent === '2->1').focus()");
     browser.press("Enter");
     browser.until("document.querySelector('#notes').textContent.includes('Address 01 has reached the master')");
     // The last byte of the picture is the master's: address 01, and the zeros stand above it.
@@ -95,7 +95,7 @@ fn another_web_site_gets_nothing() {
         ),
     ] {
         let tried = browser.text(&format!(
-            "fetch('{place}fault', {options}).then(async (own) => own.type + (await own.text()), () => 'failed')"
+            "fetch('{place}fault', {options}).then(async (reply) => reply.type + (await reply.text()), () => 'failed')"
         ));
         assert!(["failed", "opaque"].contains(&tried.as_str()), "{tried}");
     }
@@ -144,7 +144,7 @@ fn every_bus_has_a_page_that_fits() {
                 "{arguments:?} at {width}: {wide}"
             );
         }
-        let nameless = "[...document.querySelectorAll('button')].filter((own) => !own.textContent.trim()).length";
+        let nameless = "[...document.querySelectorAll('button')].filter((button) => !button.textContent.trim()).length";
         assert_eq!(browser.value(nameless), 0, "{arguments:?}");
         // It must not ask for more when the program has ended.
         browser.go("about:blank");

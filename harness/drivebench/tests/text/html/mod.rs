@@ -54,7 +54,7 @@ fn shown(number: usize, name: &str, text: &str) -> ShownScenario {
         .map(|s| s.text.clone())
         .collect();
     let drives = traces[0].stations.to_string();
-    let own = ScenarioView {
+    let view = ScenarioView {
         name: entry.short_name(),
         title: &entry.scenario.title,
         sources: &sources,
@@ -66,7 +66,7 @@ fn shown(number: usize, name: &str, text: &str) -> ShownScenario {
         rate: entry.rate(),
         again: "drivebench trace it",
     };
-    section(number, &own)
+    section(number, &view)
 }
 
 /// The page of scenarios by name and text.

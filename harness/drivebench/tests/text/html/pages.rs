@@ -77,7 +77,7 @@ fn found_on_a_rig(number: usize, verdict: Verdict, remark: &str) -> ShownScenari
         remarks: vec![remark.to_owned()],
         ..outcome
     };
-    let own = ScenarioView {
+    let view = ScenarioView {
         name: "parity",
         title: "a title",
         sources: &[],
@@ -93,7 +93,7 @@ fn found_on_a_rig(number: usize, verdict: Verdict, remark: &str) -> ShownScenari
         rate: Rate::Baud38400,
         again: "drivebench trace it",
     };
-    section(number, &own)
+    section(number, &view)
 }
 
 /// The verdict, the cable and the reason of a skip stand in front; damaged bytes have what was sent, and the drives at a fault are labelled.
@@ -154,7 +154,7 @@ fn the_data_holds_every_byte() {
         let all = parsed.all();
         let json = all
             .iter()
-            .find(|own| own.attribute("type") == Some("application/json"))
+            .find(|element| element.attribute("type") == Some("application/json"))
             .expect("data")
             .text();
         let data: serde_json::Value = serde_json::from_str(&json).expect("JSON");
@@ -168,8 +168,8 @@ fn the_data_holds_every_byte() {
                     carried.at.since_start().units().abs_diff(at) <= 6,
                     "{name}, link {place}, byte {row}"
                 );
-                let holds = |first: i64, count: i64, own: usize| {
-                    (first..first + count).contains(&i64::try_from(own).expect("small"))
+                let holds = |first: i64, count: i64, row: usize| {
+                    (first..first + count).contains(&i64::try_from(row).expect("small"))
                 };
                 let found: Vec<_> = areas
                     .chunks(8)

@@ -110,7 +110,7 @@ pub(crate) struct Element {
 
 impl Element {
     pub(crate) fn attribute(&self, name: &str) -> Option<&str> {
-        let found = self.attributes.iter().find(|(own, _)| own == name);
+        let found = self.attributes.iter().find(|(known, _)| known == name);
         found.map(|(_, value)| value.as_str())
     }
 
@@ -174,15 +174,15 @@ impl Reader<'_> {
         self.rest = rest;
         let mut attributes = Vec::new();
         while let Some(rest) = self.rest.strip_prefix(' ') {
-            let (own, rest) = word(rest);
+            let (name, rest) = word(rest);
             assert!(
-                ATTRIBUTES.contains(&own),
-                "attribute {own:?} at {:.80}",
+                ATTRIBUTES.contains(&name),
+                "attribute {name:?} at {:.80}",
                 self.rest
             );
             let rest = rest.strip_prefix("=\"").expect("a quoted value");
             let (value, rest) = rest.split_once('"').expect("an end of a value");
-            attributes.push((own.to_owned(), plain(value)));
+            attributes.push((name.to_owned(), plain(value)));
             self.rest = rest;
         }
         let mut element = Element {
@@ -284,9 +284,9 @@ pub(crate) fn sound(page: &Element) {
     }
     let policy = all
         .iter()
-        .find(|own| own.attribute("http-equiv") == Some("Content-Security-Policy"));
+        .find(|element| element.attribute("http-equiv") == Some("Content-Security-Policy"));
     let policy = policy
-        .and_then(|own| own.attribute("content"))
+        .and_then(|element| element.attribute("content"))
         .expect("a policy");
     assert!(
         policy.starts_with("default-src 'none';") && policy.contains("script-src 'sha256-"),
@@ -317,18 +317,18 @@ fn addresses(all: &[&Element], ids: &BTreeSet<&str>) {
 fn order(all: &[&Element]) {
     let mut level = 0;
     for element in all {
-        if let Some(own) = element
+        if let Some(number) = element
             .name
             .strip_prefix('h')
             .and_then(|n| n.parse::<usize>().ok())
         {
             assert!(
-                own <= level + 1,
-                "h{own} behind h{level}: {}",
+                number <= level + 1,
+                "h{number} behind h{level}: {}",
                 element.text()
             );
             assert!(!element.text().trim().is_empty(), "an empty heading");
-            level = own;
+            level = number;
         }
         if element.name == "table" {
             let first = element.all().get(1).map(|first| first.name.clone());
@@ -343,7 +343,7 @@ fn order(all: &[&Element]) {
             assert_eq!(element.attribute("role"), Some("img"));
             let names: Vec<_> = element.all()[1..3]
                 .iter()
-                .map(|own| own.name.as_str())
+                .map(|element| element.name.as_str())
                 .collect();
             assert_eq!(names, ["title", "desc"]);
         }

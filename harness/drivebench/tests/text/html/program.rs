@@ -21,8 +21,8 @@ pub(super) fn path(path: &Path) -> &str {
 
 #[test]
 fn run_writes_a_page_over_an_old_one() {
-    let own = folder("run");
-    let file = own.join("page.html");
+    let home = folder("run");
+    let file = home.join("page.html");
     std::fs::write(&file, "old").expect("a file");
     let output = drivebench(&[
         "run",
@@ -36,7 +36,7 @@ fn run_writes_a_page_over_an_old_one() {
     sound(&parse(&html));
     assert!(html.contains("2 passed") && html.contains("id=\"s2\""));
     assert_eq!(
-        std::fs::read_dir(&own).expect("a folder").count(),
+        std::fs::read_dir(&home).expect("a folder").count(),
         1,
         "nothing is left beside it"
     );
@@ -54,14 +54,14 @@ fn run_writes_a_page_over_an_old_one() {
 /// The record is the truth of a run, and the reports follow from it, byte by byte.
 #[test]
 fn a_folder_gives_its_reports_again() {
-    let own = folder("again");
+    let home = folder("again");
     let (evidence, html, xml) = (
-        own.join("evidence"),
-        own.join("again.html"),
-        own.join("again.xml"),
+        home.join("evidence"),
+        home.join("again.html"),
+        home.join("again.xml"),
     );
-    let page = own.join("page.html");
-    let setup = own.join("wrong.scn");
+    let page = home.join("page.html");
+    let setup = home.join("wrong.scn");
     std::fs::write(&setup, super::FAILS).expect("a file");
     let output = drivebench(&[
         "run",
@@ -102,8 +102,8 @@ fn a_folder_gives_its_reports_again() {
 /// A run that was killed: of every length of its record there is a report or a reason.
 #[test]
 fn a_folder_that_is_cut_off_gives_what_there_is() {
-    let own = folder("cut");
-    let evidence = own.join("evidence");
+    let home = folder("cut");
+    let evidence = home.join("evidence");
     let output = drivebench(&[
         "run",
         "--rig",
@@ -116,7 +116,7 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let record = evidence.join("run.jsonl");
     let whole = std::fs::read(&record).expect("a record");
-    let html = own.join("page.html");
+    let html = home.join("page.html");
     let lines = whole.iter().filter(|byte| **byte == b'\n').count();
     let length = |count: usize| {
         let ends = whole.iter().enumerate().filter(|(_, byte)| **byte == b'\n');
@@ -150,7 +150,7 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("`splendid` is not a verdict"));
     std::fs::write(&record, "{\"kind\":\"other\"}\n").expect("a file");
     std::fs::remove_file(&html).expect("a file");
-    for folder in [path(&evidence), path(&own), "/dev/null"] {
+    for folder in [path(&evidence), path(&home), "/dev/null"] {
         let output = drivebench(&["report", folder, "--html", path(&html)]);
         assert_eq!(output.status.code(), Some(2), "{folder}: {output:?}");
         assert!(!html.exists() && !output.stderr.is_empty());
@@ -171,9 +171,9 @@ pub(super) fn finding(folder: &Path) -> (PathBuf, PathBuf) {
 /// The page of a run of fuzzing: what was found with its picture, made again from the folder.
 #[test]
 fn fuzzing_writes_a_page() {
-    let own = folder("fuzz");
-    let again = own.join("again.html");
-    let (out, html) = finding(&own);
+    let home = folder("fuzz");
+    let again = home.join("again.html");
+    let (out, html) = finding(&home);
     let text = read(&html);
     let parsed = parse(&text);
     sound(&parsed);
@@ -199,8 +199,8 @@ fn fuzzing_writes_a_page() {
 /// The page of a campaign: the same figures as its table, and a cell for each byte of each link.
 #[test]
 fn a_campaign_writes_a_page() {
-    let own = folder("campaign");
-    let html = own.join("page.html");
+    let home = folder("campaign");
+    let html = home.join("page.html");
     let output = drivebench(&["campaign", "9.9-silence", "--html", path(&html)]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let text = read(&html);
@@ -209,18 +209,18 @@ fn a_campaign_writes_a_page() {
     let all = parsed.all();
     let map = all
         .iter()
-        .find(|own| own.attribute("class") == Some("heat"))
+        .find(|element| element.attribute("class") == Some("heat"))
         .expect("a map");
     let rows: Vec<_> = map
         .all()
         .into_iter()
-        .filter(|own| own.name == "tr")
+        .filter(|element| element.name == "tr")
         .collect();
     // Three drives have four links.
     assert!(rows.iter().all(|row| {
         row.all()
             .iter()
-            .filter(|own| own.name == "td" || own.name == "th")
+            .filter(|element| element.name == "td" || element.name == "th")
             .count()
             == 5
     }));
@@ -232,7 +232,7 @@ fn a_campaign_writes_a_page() {
     let count = located.split_whitespace().nth(1).expect("a count");
     let row = all
         .iter()
-        .filter(|own| own.name == "tr")
+        .filter(|element| element.name == "tr")
         .find(|row| row.text().replace('\n', " ").trim().starts_with("located"))
         .expect("a row");
     assert!(row.text().contains(count), "{count}");

@@ -89,9 +89,9 @@ proptest! {
     /// No name and no message makes a report that is none.
     #[test]
     fn any_words(name in any::<String>(), message in any::<String>(), path in any::<String>(), verdict in 0..Verdict::ALL.len()) {
-        let mut own = case(&name, Verdict::ALL[verdict], &message);
-        own.attachments.push(path);
-        let xml = junit(&message, &[own.clone(), own]);
+        let mut case = case(&name, Verdict::ALL[verdict], &message);
+        case.attachments.push(path);
+        let xml = junit(&message, &[case.clone(), case]);
         prop_assert_eq!(wrong(&xml), Vec::<String>::new(), "{}", xml);
     }
 }

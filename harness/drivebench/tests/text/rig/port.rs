@@ -53,7 +53,7 @@ fn a_port_of_slaves_on_a_line() {
     assert_eq!(good(&printed).file, rig.file);
     let simulated = find("sim:nordac:2", Path::new("nowhere")).expect("a rig");
     let drives = simulated.port().map(|port| port.drives.clone());
-    let addresses: Vec<_> = drives.iter().flatten().map(|own| own.address).collect();
+    let addresses: Vec<_> = drives.iter().flatten().map(|drive| drive.address).collect();
     assert!(simulated.is_simulated());
     assert_eq!(addresses, [Some(8), Some(9)]);
     assert!(find("sim:nordac:120", Path::new("nowhere")).is_err());
@@ -67,7 +67,7 @@ fn a_line_behind_rfc_2217() {
         text.replace("{ node = 1 }", "{ address = 8 }")
     };
     let rig = good(&line("transport = \"rfc2217\"\nport = \"lab:4200\""));
-    let place = rig.port().and_then(|own| own.line());
+    let place = rig.port().and_then(|port| port.line());
     assert_eq!(place, Some(PortAddress::Rfc2217("lab:4200".to_owned())));
     let printed = toml::to_string(&rig.file).expect("a text");
     assert_eq!(good(&printed).file, rig.file);
