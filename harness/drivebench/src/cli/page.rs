@@ -28,7 +28,6 @@ impl Page {
         }))
     }
 
-    /// Where it goes.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }

@@ -99,14 +99,14 @@ pub(crate) fn of_rig(mut entries: Vec<Entry>, rig: &Rig, output: &mut Output) ->
 }
 
 /// The rig and the scenarios of a run.
-struct Chosen {
+struct RunSelection {
     rig: Option<Rig>,
     entries: Vec<Entry>,
     part: Option<SplitRun>,
     earlier: EarlierVerdicts,
 }
 
-impl Chosen {
+impl RunSelection {
     /// The rig, if it is more than a number of drives.
     fn in_use(&self) -> Option<&Rig> {
         self.rig.as_ref().filter(|rig| !is_bare(rig))
@@ -146,7 +146,7 @@ fn read_rig_and_scenarios(
 
 /// Chooses what is played of the selected scenarios: what no earlier run has shown, and of this the part. The exit code where there is
 /// nothing to play, which has been reported.
-fn choose(arguments: &RunArguments, output: &mut Output) -> Result<Chosen, Exit> {
+fn choose(arguments: &RunArguments, output: &mut Output) -> Result<RunSelection, Exit> {
     let (rig, mut entries) = read_rig_and_scenarios(arguments, output)?;
     let none = Cases::new(
         rig.as_ref().map_or("sim", Rig::id),
@@ -182,7 +182,7 @@ fn choose(arguments: &RunArguments, output: &mut Output) -> Result<Chosen, Exit>
             return Err(none.write(Exit::NothingSelected, output));
         }
     }
-    Ok(Chosen {
+    Ok(RunSelection {
         rig,
         entries,
         part,

@@ -26,12 +26,12 @@ pub(super) struct Recorded {
     pub(super) sha256: String,
     pub(super) attempt: usize,
     pub(super) events: Vec<LinkEvent>,
-    pub(super) verdict: Option<Recalled>,
+    pub(super) verdict: Option<RecordedVerdict>,
 }
 
 /// The verdict of a record.
 #[derive(Clone)]
-pub(super) struct Recalled {
+pub(super) struct RecordedVerdict {
     pub(super) verdict: String,
     pub(super) finding: Option<String>,
     pub(super) remarks: Vec<String>,
@@ -40,7 +40,7 @@ pub(super) struct Recalled {
     pub(super) opening: Option<String>,
 }
 
-impl Recalled {
+impl RecordedVerdict {
     /// Its remarks about faults that never happened.
     pub(super) fn unused(&self) -> impl Iterator<Item = &String> {
         let remarks = self.remarks.iter();
@@ -49,7 +49,7 @@ impl Recalled {
 }
 
 /// The outcome of an attempt that was played again.
-pub(super) struct Again {
+pub(super) struct ReplayedAttempt {
     /// Its outcome, and in a qualification its conversations and how they compare with the twin's.
     pub(super) attempt: Attempt,
     /// What the record holds behind the end of the attempt.
@@ -62,7 +62,7 @@ pub(super) struct Again {
     exact: bool,
     /// Whether the record ends in trouble.
     pub(super) trouble: bool,
-    ended: Ended,
+    ended: ConversationEnd,
 }
 
 /// Judges an attempt on a rig again.
@@ -73,7 +73,7 @@ pub(super) fn again(
     recorded: &Recorded,
     text: &str,
     judge: &mut dyn RecordJudge,
-) -> Result<Again, String> {
+) -> Result<ReplayedAttempt, String> {
     let source = Source {
         name: recorded.name.clone(),
         text: text.to_owned().into(),
@@ -91,28 +91,32 @@ pub(super) fn again(
         ),
         None => (None, None),
     };
-    Ok(Again {
+    Ok(ReplayedAttempt {
         attempt: judged.attempt,
         left: judged.left,
         other,
         capture: made,
         exact: judged.exact,
         trouble: judged.trouble,
-        ended: Ended::of(&recorded.events),
+        ended: ConversationEnd::of(&recorded.events),
     })
 }
 
 /// Plays an attempt again on a simulated bench of its own.
-pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, drives: &[u8]) -> Again {
+pub(super) fn again_on_own_bench(
+    recorded: &Recorded,
+    text: &str,
+    drives: &[u8],
+) -> ReplayedAttempt {
     let source = Source {
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
     match Entry::fitting(source, drives.first().copied()) {
-        Err(problems) => Again::impossible(problems.to_string()),
+        Err(problems) => ReplayedAttempt::impossible(problems.to_string()),
         Ok(entry) => match entry.settled.rings() {
             Some(rings) if rings.drives != drives => {
-                Again::impossible("it is for other rings than the rig has".to_owned())
+                ReplayedAttempt::impossible("it is for other rings than the rig has".to_owned())
             }
             _ => simulated_again(recorded, &*entry.settled),
         },
@@ -120,20 +124,20 @@ pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, drives: &[u8])
 }
 
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
-fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
+fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> ReplayedAttempt {
     let mut link = plan.simulate();
     let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::whole(&mut *link, &mut events);
     let outcome = plan.play(&mut recording, AtMismatch::Stop);
     let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
-    Again {
+    ReplayedAttempt {
         capture: Some(capture(&traces, &outcome)),
         exact: true,
         trouble: false,
         attempt: Attempt::new(outcome, traces),
         left: None,
         other: first_difference(&recorded.events, &events),
-        ended: Ended::of(&recorded.events),
+        ended: ConversationEnd::of(&recorded.events),
     }
 }
 
@@ -156,7 +160,7 @@ fn first_difference(recorded: &[LinkEvent], played: &[LinkEvent]) -> Option<Stri
     ))
 }
 
-impl Again {
+impl ReplayedAttempt {
     /// Nothing could be played.
     fn impossible(why: String) -> Self {
         Self {
@@ -166,7 +170,7 @@ impl Again {
             capture: None,
             exact: false,
             trouble: false,
-            ended: Ended::of(&[]),
+            ended: ConversationEnd::of(&[]),
         }
     }
 }
@@ -181,7 +185,7 @@ impl Recorded {
     }
 
     /// What the record says of the attempt and its bytes do not bear out.
-    pub(super) fn differs(&self, again: &Again, header: &Header) -> Option<String> {
+    pub(super) fn differs(&self, again: &ReplayedAttempt, header: &Header) -> Option<String> {
         let verdict = self.verdict.as_ref()?;
         verdict
             .verdict_differs(again)
@@ -191,7 +195,7 @@ impl Recorded {
     }
 
     /// Line errors and unused faults that cannot have been.
-    fn unplaced_or_unused(&self, verdict: &Recalled, header: &Header) -> Option<String> {
+    fn unplaced_or_unused(&self, verdict: &RecordedVerdict, header: &Header) -> Option<String> {
         if header.simulated && verdict.unplaced > 0 {
             return Some("a simulated ring places every line error".to_owned());
         }
@@ -212,8 +216,8 @@ impl Recorded {
     }
 }
 
-impl Recalled {
-    fn verdict_differs(&self, again: &Again) -> Option<String> {
+impl RecordedVerdict {
+    fn verdict_differs(&self, again: &ReplayedAttempt) -> Option<String> {
         if let Some(other) = &again.other {
             return Some(other.clone());
         }
@@ -238,7 +242,7 @@ impl Recalled {
     }
 
     /// Remarks and what came before the reset. Which faults never happened is not in the bytes that the master received.
-    fn remarks_differ(&self, again: &Again) -> Option<String> {
+    fn remarks_differ(&self, again: &ReplayedAttempt) -> Option<String> {
         let settled = |remarks: &[String]| -> Vec<String> {
             let captured = again.capture.is_some();
             let kept = |remark: &&String| captured || !remark.starts_with(UNUSED);
@@ -267,7 +271,7 @@ impl Recalled {
     }
 
     /// What is left over, and the time.
-    fn rest_differs(&self, again: &Again, header: &Header) -> Option<String> {
+    fn rest_differs(&self, again: &ReplayedAttempt, header: &Header) -> Option<String> {
         let outcome = &again.attempt.outcome;
         // Without looks, an attempt that was given up may have been so at any byte, and shows nothing.
         let given_up = outcome.unready.is_some()
@@ -297,7 +301,7 @@ impl Recalled {
 impl Header {
     /// The shortest and the longest time that an attempt can have taken. Bytes sent last come round after its end, and if they
     /// are not fetched the record does not say when. In real time a wait also ends a little late.
-    fn could_take(&self, took: Span, ended: &Ended) -> (Span, Span) {
+    fn could_take(&self, took: Span, ended: &ConversationEnd) -> (Span, Span) {
         let real = match self.tolerance {
             Span::ZERO => Span::ZERO,
             tolerance => tolerance + WAITED,
@@ -310,14 +314,14 @@ impl Header {
 }
 
 /// How the last conversation of an attempt ended, as far as its record says.
-struct Ended {
+struct ConversationEnd {
     /// The time of its last event.
     at: Span,
     /// How long faults may have held bytes up.
     held: Span,
 }
 
-impl Ended {
+impl ConversationEnd {
     fn of(events: &[LinkEvent]) -> Self {
         let begin = |event: &LinkEvent| matches!(event, LinkEvent::Begin(_));
         let last = events.iter().rposition(begin).unwrap_or(0);

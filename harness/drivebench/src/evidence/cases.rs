@@ -2,7 +2,7 @@
 
 use super::files::{SCENARIOS, sum};
 use super::record::RecordLine;
-use super::verify::{Judged, Opened};
+use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::counted::counted;
 use crate::library::Entry;
 use crate::link::LinkEvent;
@@ -16,7 +16,11 @@ use harness_proto::time::Span;
 type Texts<'t> = &'t dyn Fn(&str) -> Result<String, String>;
 
 /// What of the lines `case` and `end` does not follow from the attempts.
-pub(super) fn differences(opened: &Opened, judged: &[Judged<'_>], texts: Texts<'_>) -> Vec<String> {
+pub(super) fn differences(
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
+    texts: Texts<'_>,
+) -> Vec<String> {
     let real = opened.header.tolerance > Span::ZERO;
     let mut settling = Settling {
         opened,
@@ -43,7 +47,7 @@ pub(super) fn differences(opened: &Opened, judged: &[Judged<'_>], texts: Texts<'
 }
 
 struct Settling<'s> {
-    opened: &'s Opened,
+    opened: &'s OpenedFolder,
     texts: Texts<'s>,
     retries: Retries,
     wrong: Vec<String>,
@@ -51,7 +55,7 @@ struct Settling<'s> {
 }
 
 impl Settling<'_> {
-    fn case(&mut self, line: &RecordLine, attempts: &[Judged<'_>]) {
+    fn case(&mut self, line: &RecordLine, attempts: &[JudgedAttempt<'_>]) {
         let RecordLine::Case {
             name,
             title,
@@ -122,7 +126,7 @@ impl Settling<'_> {
     }
 
     /// Attempts are counted from 1, and there are as many as the rig's file asks for.
-    fn numbers(&mut self, name: &str, attempts: &[Judged<'_>]) {
+    fn numbers(&mut self, name: &str, attempts: &[JudgedAttempt<'_>]) {
         let header = &self.opened.header;
         let numbers = attempts.iter().map(|attempt| attempt.recorded.attempt);
         if !numbers.eq(1..=attempts.len()) {
@@ -150,7 +154,7 @@ impl Settling<'_> {
         }
     }
 
-    fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[Judged<'_>]) {
+    fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[JudgedAttempt<'_>]) {
         if let Some(attempt) = left.first() {
             self.wrong.push(format!(
                 "{}: the record has its attempts and no line of what came of them",
@@ -178,14 +182,14 @@ impl Settling<'_> {
 }
 
 /// The outcomes of attempts as they were judged again.
-fn settled(attempts: &[Judged<'_>]) -> Vec<Attempt> {
-    let outcomes = attempts.iter().filter_map(Judged::outcome);
+fn settled(attempts: &[JudgedAttempt<'_>]) -> Vec<Attempt> {
+    let outcomes = attempts.iter().filter_map(JudgedAttempt::outcome);
     outcomes
         .map(|outcome| Attempt::new(outcome, Vec::new()))
         .collect()
 }
 
-impl Judged<'_> {
+impl JudgedAttempt<'_> {
     /// The outcome as it was judged again, with faults that never happened, which only the run knows.
     fn outcome(&self) -> Option<Outcome> {
         let (_, again) = self.again.as_ref().ok()?;
@@ -214,7 +218,7 @@ impl Judged<'_> {
     }
 }
 
-impl Opened {
+impl OpenedFolder {
     /// A scenario of the folder, settled for the rings of the rig.
     pub(super) fn entry(&self, name: &str, text: &str) -> Result<Entry, String> {
         let source = Source {

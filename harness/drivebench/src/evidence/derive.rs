@@ -9,7 +9,7 @@ use super::files::{self, CAPTURES, DEVIATIONS, PROFILE, SCENARIOS};
 use super::junit::{JunitCase, junit};
 use super::merge::{MERGE, derive_merged};
 use super::record::RecordLine;
-use super::verify::{Judged, Opened, is_name, scenarios};
+use super::verify::{JudgedAttempt, OpenedFolder, is_name, scenarios};
 use crate::buses::report_of;
 use crate::capture::{MAX_FILE, read};
 use crate::library::Entry;
@@ -44,7 +44,7 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
     if path.join(MERGE).exists() {
         return derive_merged(path);
     }
-    let opened = Opened::folder(path)?;
+    let opened = OpenedFolder::open(path)?;
     let judged = opened.judged(&scenarios(path))?;
     derived(path, &opened, &judged)
 }
@@ -52,8 +52,8 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
 /// Makes the reports of a folder whose attempts were played again.
 pub(super) fn derived(
     path: &Path,
-    opened: &Opened,
-    judged: &[Judged<'_>],
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
 ) -> Result<Derived, EvidenceError> {
     let all = case_reports(path, opened, judged, &|place| place + 1)?;
     let (cases, shown) = all
@@ -87,8 +87,8 @@ impl CaseReport {
 /// What the reports say of each scenario of a folder, in its order; `number` gives the number of a section by its place.
 pub(super) fn case_reports(
     path: &Path,
-    opened: &Opened,
-    judged: &[Judged<'_>],
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
     number: &dyn Fn(usize) -> usize,
 ) -> Result<Vec<CaseReport>, EvidenceError> {
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
@@ -369,7 +369,7 @@ fn show(
     attempt: Option<&Attempt>,
     outcome: &Outcome,
     traces: &[Trace],
-    opened: &Opened,
+    opened: &OpenedFolder,
 ) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
     let report = entry
@@ -418,7 +418,7 @@ fn found(path: &Path) -> Vec<(&'static str, String)> {
     found.collect()
 }
 
-fn head(path: &Path, opened: &Opened) -> Head<'static> {
+fn head(path: &Path, opened: &OpenedFolder) -> Head<'static> {
     let mut facts = vec![("Rig", opened.rig.id().to_owned())];
     if let Some(RecordLine::Run {
         drivebench,

@@ -5,7 +5,7 @@ use super::error::EvidenceError;
 use super::files::sum;
 use super::merge::{MERGE, opened_parts, verify_merged};
 use super::record::RecordLine;
-use super::verify::{Opened, Verified, verify};
+use super::verify::{OpenedFolder, Verified, verify};
 use crate::library::Entry;
 use crate::rig::Rig;
 use crate::scenario::verdict::Verdict;
@@ -16,18 +16,18 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Earlier {
     /// By the sum of its text.
-    scenarios: BTreeMap<String, Known>,
+    scenarios: BTreeMap<String, KnownScenario>,
 }
 
 /// What an earlier run says of a scenario.
 #[derive(Clone, Debug)]
-struct Known {
+struct KnownScenario {
     name: String,
     /// `None` if the run did not come to it.
     verdict: Option<Verdict>,
 }
 
-impl Known {
+impl KnownScenario {
     /// The verdict of a scenario that need not be played again.
     fn shown(&self) -> Option<Verdict> {
         let done = [Verdict::Passed, Verdict::Marginal];
@@ -76,12 +76,12 @@ fn text_sum(entry: &Entry) -> String {
 }
 
 /// What a folder says of each scenario.
-fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceError> {
+fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, KnownScenario>, EvidenceError> {
     let refused = |why: String| EvidenceError::Earlier(format!("{}: {why}", path.display()));
     let is_merged = path.join(MERGE).exists();
     let (verified, records) = match is_merged {
         true => (verify_merged(path, None)?.0, opened_parts(path)?),
-        false => (verify(path, None)?, vec![Opened::folder(path)?]),
+        false => (verify(path, None)?, vec![OpenedFolder::open(path)?]),
     };
     for record in &records {
         fits(record, rig).map_err(refused)?;
@@ -95,12 +95,14 @@ fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceErro
     for record in &records {
         for (sum, name) in selected(record) {
             let verdict = None;
-            scenarios.entry(sum).or_insert(Known { name, verdict });
+            scenarios
+                .entry(sum)
+                .or_insert(KnownScenario { name, verdict });
         }
     }
     for record in &records {
         for (sum, name, verdict) in record.lines.iter().filter_map(case) {
-            let known = scenarios.entry(sum).or_insert(Known {
+            let known = scenarios.entry(sum).or_insert(KnownScenario {
                 name: name.clone(),
                 verdict: None,
             });
@@ -115,7 +117,7 @@ fn known(path: &Path, rig: &Rig) -> Result<BTreeMap<String, Known>, EvidenceErro
 }
 
 /// Whether a record is of a run on this rig, by this program; why not, in a sentence.
-fn fits(record: &Opened, rig: &Rig) -> Result<(), String> {
+fn fits(record: &OpenedFolder, rig: &Rig) -> Result<(), String> {
     let header = &record.header;
     let profile = |rig: &Rig| rig.profile.as_ref().map(|profile| profile.text.clone());
     if header.program != env!("CARGO_PKG_VERSION") {
@@ -139,7 +141,7 @@ fn fits(record: &Opened, rig: &Rig) -> Result<(), String> {
 
 /// The sums and names of the scenarios that were to be played. The record of a run that was killed has no names of those that it did not
 /// come to.
-fn selected(record: &Opened) -> Vec<(String, String)> {
+fn selected(record: &OpenedFolder) -> Vec<(String, String)> {
     match (&record.header.part, &record.header.selected) {
         (Some(part), _) => {
             let all = part.scenarios.iter();

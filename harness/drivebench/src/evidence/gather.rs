@@ -7,7 +7,7 @@ use super::qualified::cases;
 use super::read_parts::ReadPart;
 use super::record::PartItem;
 use super::selection;
-use super::verify::{Judged, scenarios};
+use super::verify::{JudgedAttempt, scenarios};
 use crate::counted::counted;
 use crate::partition::Partition;
 use crate::rig::playing::{QualificationRecord, Qualified, RecordJudge, RecordedPart};
@@ -52,7 +52,7 @@ pub(super) struct Gathering<'g> {
 /// A part whose attempts were judged again.
 struct JudgedPart<'g> {
     part: &'g ReadPart,
-    judged: Vec<Judged<'g>>,
+    judged: Vec<JudgedAttempt<'g>>,
     /// The places of its scenarios in the list of all.
     places: &'g [usize],
     /// Whether it was played to its end.

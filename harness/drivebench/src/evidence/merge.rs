@@ -18,7 +18,7 @@ use super::qualified::compare;
 use super::read_parts::{PARTS, ReadPart, copy, entries, failed, parts_of, place, read};
 use super::reports::{file, moved};
 use super::signature::Signer;
-use super::verify::{Opened, Verified, verify};
+use super::verify::{OpenedFolder, Verified, verify};
 use crate::partition::Partition;
 use crate::regular;
 use crate::rig::playing::Qualified;
@@ -52,7 +52,7 @@ pub struct Merged {
 }
 
 /// The files of a merged folder.
-struct Made {
+struct MergedFiles {
     merged: Merged,
     record: String,
     junit: String,
@@ -189,7 +189,7 @@ pub(super) fn derive_merged(path: &Path) -> Result<Derived, EvidenceError> {
 }
 
 /// The records of the parts of a merged folder.
-pub(super) fn opened_parts(path: &Path) -> Result<Vec<Opened>, EvidenceError> {
+pub(super) fn opened_parts(path: &Path) -> Result<Vec<OpenedFolder>, EvidenceError> {
     let parts = parts_of(path)?.into_iter();
     Ok(parts.map(|part| part.opened).collect())
 }
@@ -203,7 +203,7 @@ fn found(qualified: &Qualified) -> Vec<(&'static str, String)> {
 }
 
 /// Makes the files of a merged folder from its parts.
-fn make(path: &Path) -> Result<Made, EvidenceError> {
+fn make(path: &Path) -> Result<MergedFiles, EvidenceError> {
     let parts = parts_of(path)?;
     let first = &parts[0];
     let (rig, all, of) = (first.opened.rig.id(), first.scenarios(), first.partition.of);
@@ -263,7 +263,7 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
         cases.push(row.junit);
         shown.extend(row.shown);
     }
-    Ok(Made {
+    Ok(MergedFiles {
         record: record(&merged, &parts),
         junit: junit(&suite(rig), &cases),
         report: plain(rig, &settled),

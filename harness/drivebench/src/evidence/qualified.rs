@@ -4,7 +4,7 @@ use super::derive::verdict_named;
 use super::files::{DEVIATIONS, PROFILE, read_text};
 use super::record::RecordLine;
 use super::selection;
-use super::verify::{Judged, Opened};
+use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::rig::playing::{QualificationRecord, Qualified, RecordJudge, RecordedCase};
 use crate::rig::{Attempt, PlayedScenario};
 use crate::scenario::run::Outcome;
@@ -17,8 +17,8 @@ pub(super) type QualifiedAgain = Result<Vec<Qualified>, String>;
 
 /// What the record of a qualification comes to.
 pub(super) fn again(
-    opened: &Opened,
-    judged: &[Judged<'_>],
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
     judge: &mut dyn RecordJudge,
 ) -> QualifiedAgain {
     let header = &opened.header;
@@ -92,8 +92,8 @@ fn difference(path: &Path, file: &str, made: &str) -> Option<String> {
 
 /// The scenarios of a record in order.
 pub(super) fn cases(
-    opened: &Opened,
-    judged: &[Judged<'_>],
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
 ) -> Result<VecDeque<RecordedCase>, String> {
     let mut left = judged;
     let mut pending = 0;
@@ -110,7 +110,8 @@ pub(super) fn cases(
             } => {
                 let (judged, rest) = left.split_at(pending.min(left.len()));
                 (left, pending) = (rest, 0);
-                let attempts: Option<Vec<Attempt>> = judged.iter().map(Judged::attempt).collect();
+                let attempts: Option<Vec<Attempt>> =
+                    judged.iter().map(JudgedAttempt::attempt).collect();
                 let attempts = attempts
                     .ok_or_else(|| format!("case {name}: an attempt cannot be judged again"))?;
                 let played = match attempts.is_empty() {
@@ -121,7 +122,7 @@ pub(super) fn cases(
                     name: name.clone(),
                     sum: sha256.clone().unwrap_or_default(),
                     played,
-                    ends_the_run: judged.iter().any(Judged::ends_the_run),
+                    ends_the_run: judged.iter().any(JudgedAttempt::ends_the_run),
                 });
             }
             _ => {}

@@ -3,7 +3,7 @@
 use super::error::EvidenceError;
 use super::files::{self, CAPTURES, SCENARIOS, SIGNATURE, SUMS, sum};
 use super::record::{PartItem, RecordLine};
-use super::verify::Opened;
+use super::verify::OpenedFolder;
 use crate::link::Capability;
 use crate::partition::Partition;
 use std::fs;
@@ -16,7 +16,7 @@ pub(super) const PARTS: &str = "parts";
 pub(super) struct ReadPart {
     pub(super) path: PathBuf,
     pub(super) partition: Partition,
-    pub(super) opened: Opened,
+    pub(super) opened: OpenedFolder,
 }
 
 /// Where a part stands in a merged folder.
@@ -64,7 +64,7 @@ pub(super) fn copy(from: &Path, to: &Path) -> Result<(), EvidenceError> {
 pub(super) fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> {
     let mut parts: Vec<ReadPart> = Vec::new();
     for path in folders {
-        let opened = Opened::folder(path)?;
+        let opened = OpenedFolder::open(path)?;
         let Some(partition) = opened.header.partition() else {
             return Err(EvidenceError::Merge(format!(
                 "{} is no part of a run: its record has no partition; `run` or `qualify` with `--partition slice:M/N --evidence FOLDER` writes one",

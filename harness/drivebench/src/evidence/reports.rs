@@ -8,7 +8,7 @@ use super::files::{
 };
 use super::folder::capture;
 use super::record::RecordLine;
-use super::verify::{Judged, Opened};
+use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::capture::read;
 use crate::link::{LinkEvent, PlacedFault};
 use crate::medium::Heard;
@@ -25,8 +25,8 @@ const ATTACHMENT: &str = "[[ATTACHMENT|";
 /// What of the derived files does not follow from the record.
 pub(super) fn differences(
     path: &Path,
-    opened: &Opened,
-    judged: &[Judged<'_>],
+    opened: &OpenedFolder,
+    judged: &[JudgedAttempt<'_>],
     made: &Derived,
 ) -> Vec<String> {
     let settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
@@ -92,7 +92,7 @@ pub(super) fn moved(made: &str, path: &Path, stated: &str, inner: &str) -> Strin
 }
 
 /// Version and date are those of the first line.
-fn versions(path: &Path, opened: &Opened) -> Option<String> {
+fn versions(path: &Path, opened: &OpenedFolder) -> Option<String> {
     let text = match files::read_text(path, VERSIONS) {
         Ok(text) => text,
         Err(why) => return Some(why),
@@ -107,7 +107,7 @@ fn versions(path: &Path, opened: &Opened) -> Option<String> {
 }
 
 /// The capture of an attempt.
-fn of_attempt(path: &Path, opened: &Opened, attempt: &Judged<'_>) -> Option<String> {
+fn of_attempt(path: &Path, opened: &OpenedFolder, attempt: &JudgedAttempt<'_>) -> Option<String> {
     let (_, again) = attempt.again.as_ref().ok()?;
     let name = format!(
         "{CAPTURES}/{}.{}.json",
@@ -210,7 +210,7 @@ struct Ends {
 type Carried = (u64, Received);
 
 impl Ends {
-    fn of(recorded: &Recorded, opened: &Opened) -> Self {
+    fn of(recorded: &Recorded, opened: &OpenedFolder) -> Self {
         let byte_time = opened.rate().byte_time();
         let mut ends = Self::new(opened);
         for event in played(recorded) {
@@ -245,7 +245,7 @@ impl Ends {
         ends
     }
 
-    fn new(opened: &Opened) -> Self {
+    fn new(opened: &OpenedFolder) -> Self {
         let empty = || [Some(Vec::new()), Some(Vec::new())];
         Self {
             rings: opened.header.drives.iter().map(|_| empty()).collect(),
@@ -293,7 +293,7 @@ impl Ends {
 }
 
 /// Files that no run leaves.
-fn foreign(path: &Path, opened: &Opened, judged: &[Judged<'_>]) -> Vec<String> {
+fn foreign(path: &Path, opened: &OpenedFolder, judged: &[JudgedAttempt<'_>]) -> Vec<String> {
     let fixed = [RECORD, RIG, JUNIT, REPORT, PAGE, VERSIONS, SUMS];
     let mut known: BTreeSet<String> = fixed.iter().map(|name| (*name).to_owned()).collect();
     known.extend(

@@ -3,7 +3,7 @@
 use super::files::{CAPTURES, read_text};
 use super::folder::capture;
 use super::record::RecordLine;
-use super::verify::{Opened, text_of};
+use super::verify::{OpenedFolder, text_of};
 use crate::buses::run_on;
 use crate::link::{LinkEvent, Sink};
 use crate::rig::playing::RigRun;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// drives behind ports, and for scenarios whose attempts are compared one by one.
 pub(super) fn rerun(
     path: &Path,
-    opened: &Opened,
+    opened: &OpenedFolder,
     texts: &dyn Fn(&str) -> Result<String, String>,
 ) -> Vec<String> {
     let header = &opened.header;
@@ -70,7 +70,7 @@ pub(super) fn rerun(
 fn scenario(
     run: &mut dyn RigRun,
     path: &Path,
-    opened: &Opened,
+    opened: &OpenedFolder,
     lines: &[RecordLine],
     texts: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<Vec<String>, String> {

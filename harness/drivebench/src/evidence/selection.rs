@@ -2,7 +2,7 @@
 
 use super::files::sum;
 use super::record::RecordLine;
-use super::verify::Opened;
+use super::verify::OpenedFolder;
 use crate::rig::playing::RecordJudge;
 
 /// How the scenarios of a record compare with those that were to be played.
@@ -15,7 +15,7 @@ pub(super) struct Selection {
 }
 
 /// Compares the lines `case` with the selection in the first line.
-pub(super) fn compare(opened: &Opened) -> Selection {
+pub(super) fn compare(opened: &OpenedFolder) -> Selection {
     let mut selection = Selection::default();
     let header = &opened.header;
     let Some(selected) = &header.selected else {
@@ -83,7 +83,7 @@ fn case(line: &RecordLine) -> Option<(&str, String)> {
 }
 
 /// What a qualification plays behind the selected scenarios.
-struct Qualifying {
+struct ExtraScenario {
     name: String,
     /// The sum of its text.
     sum: String,
@@ -91,9 +91,9 @@ struct Qualifying {
     always: bool,
 }
 
-fn qualifying(judge: &dyn RecordJudge) -> Vec<Qualifying> {
+fn qualifying(judge: &dyn RecordJudge) -> Vec<ExtraScenario> {
     let all = judge.conversations().into_iter();
-    let listed = all.map(|conversation| Qualifying {
+    let listed = all.map(|conversation| ExtraScenario {
         sum: sum(conversation.source.text.as_bytes()),
         name: conversation.source.name,
         always: conversation.always,

@@ -1,6 +1,8 @@
 //! Every verdict of a folder, judged again from its record, and everything that follows from the record compared.
 
-use super::attempt::{Again, Recalled, Recorded, UNUSED, again, again_on_own_bench};
+use super::attempt::{
+    Recorded, RecordedVerdict, ReplayedAttempt, UNUSED, again, again_on_own_bench,
+};
 use super::cases;
 use super::derive::derived;
 use super::error::EvidenceError;
@@ -85,10 +87,10 @@ pub struct Beside<'b> {
 }
 
 /// An attempt that was played again.
-pub(super) struct Judged<'o> {
+pub(super) struct JudgedAttempt<'o> {
     pub(super) recorded: &'o Recorded,
     /// Its text and what came of it, or why it cannot be played.
-    pub(super) again: Result<(String, Again), String>,
+    pub(super) again: Result<(String, ReplayedAttempt), String>,
     /// What the record says of it and its bytes do not bear out.
     pub(super) differs: Option<String>,
 }
@@ -104,7 +106,7 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
     if let Some(signer) = signer {
         files.extend(signature::check(path, signer)?);
     }
-    let opened = Opened::folder(path)?;
+    let opened = OpenedFolder::open(path)?;
     let scenario = scenarios(path);
     let (judged, qualification) = opened.judged_and_qualified(&scenario)?;
     let mut verified = opened.verified(&judged, &scenario);
@@ -150,13 +152,13 @@ pub(super) fn scenarios(path: &Path) -> impl Fn(&str) -> Result<String, String> 
 /// # Errors
 /// It is damaged; with the place. Or it is of another rig.
 pub fn judge_record(record: &[u8], beside: &Beside<'_>) -> Result<Verified, EvidenceError> {
-    let opened = Opened::of(record, beside.rig.clone())?;
+    let opened = OpenedFolder::of(record, beside.rig.clone())?;
     let judged = opened.judged(beside.scenario)?;
     Ok(opened.verified(&judged, beside.scenario))
 }
 
 /// A record that has been read, and what it is judged by.
-pub(super) struct Opened {
+pub(super) struct OpenedFolder {
     /// All but the events of attempts.
     pub(super) lines: Vec<RecordLine>,
     pub(super) attempts: Vec<Recorded>,
@@ -170,9 +172,9 @@ pub(super) struct Opened {
     files: Vec<String>,
 }
 
-impl Opened {
+impl OpenedFolder {
     /// Reads the record and the rig's file of a folder.
-    pub(super) fn folder(path: &Path) -> Result<Self, EvidenceError> {
+    pub(super) fn open(path: &Path) -> Result<Self, EvidenceError> {
         let foreign = |what: String| EvidenceError::Foreign(path.display().to_string(), what);
         regular::has_run(path, RECORD).map_err(foreign)?;
         let record = regular::open(&path.join(RECORD), Links::Refuse)
@@ -239,7 +241,7 @@ impl Opened {
     pub(super) fn judged(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Vec<Judged<'_>>, EvidenceError> {
+    ) -> Result<Vec<JudgedAttempt<'_>>, EvidenceError> {
         Ok(match self.judge()? {
             Some(mut judge) => self.judged_by(judge.as_mut(), scenario),
             None => self.judged_each(scenario, |recorded, text| {
@@ -252,7 +254,7 @@ impl Opened {
     fn judged_and_qualified(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<(Vec<Judged<'_>>, Option<QualifiedAgain>), EvidenceError> {
+    ) -> Result<(Vec<JudgedAttempt<'_>>, Option<QualifiedAgain>), EvidenceError> {
         let Some(mut judge) = self.judge()?.filter(|_| self.header.qualified) else {
             return Ok((self.judged(scenario)?, None));
         };
@@ -277,7 +279,7 @@ impl Opened {
         &self,
         judge: &mut dyn RecordJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Vec<Judged<'_>> {
+    ) -> Vec<JudgedAttempt<'_>> {
         self.judged_each(scenario, |recorded, text| again(recorded, text, judge))
     }
 
@@ -285,8 +287,8 @@ impl Opened {
     fn judged_each(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-        mut again: impl FnMut(&Recorded, &str) -> Result<Again, String>,
-    ) -> Vec<Judged<'_>> {
+        mut again: impl FnMut(&Recorded, &str) -> Result<ReplayedAttempt, String>,
+    ) -> Vec<JudgedAttempt<'_>> {
         let attempts = self.attempts.iter();
         attempts
             .map(|recorded| {
@@ -299,7 +301,7 @@ impl Opened {
                     Err(why) => Some(why.clone()),
                     Ok((_, again)) => recorded.differs(again, &self.header),
                 };
-                Judged {
+                JudgedAttempt {
                     recorded,
                     again,
                     differs,
@@ -309,7 +311,7 @@ impl Opened {
     }
 
     /// Whether the record has its last line and the verdict of every attempt.
-    fn is_ended(&self, judged: &[Judged<'_>]) -> bool {
+    fn is_ended(&self, judged: &[JudgedAttempt<'_>]) -> bool {
         self.whole
             && matches!(self.lines.last(), Some(RecordLine::End { .. }))
             && judged
@@ -320,12 +322,12 @@ impl Opened {
     /// What the record is worth.
     fn verified(
         &self,
-        judged: &[Judged<'_>],
+        judged: &[JudgedAttempt<'_>],
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Verified {
         let mut verified = Verified {
             files: self.files.clone(),
-            attempts: judged.iter().map(Judged::finding).collect(),
+            attempts: judged.iter().map(JudgedAttempt::finding).collect(),
             // The ring may have been lost in the middle of an attempt.
             complete: self.is_ended(judged),
             unconfirmed: self.unconfirmed(),
@@ -412,10 +414,10 @@ pub(super) fn text_of(
     }
 }
 
-impl Judged<'_> {
+impl JudgedAttempt<'_> {
     fn finding(&self) -> Rejudged {
         let verdict = self.recorded.verdict.as_ref();
-        let unused = verdict.into_iter().flat_map(Recalled::unused);
+        let unused = verdict.into_iter().flat_map(RecordedVerdict::unused);
         let judged = self.again.as_ref();
         Rejudged {
             name: self.recorded.title(),
@@ -456,7 +458,7 @@ fn begin_or_end(attempts: &mut Vec<Recorded>, line: &RecordLine) {
         } => {
             if let Some(last) = attempts.last_mut() {
                 last.events.shrink_to_fit();
-                last.verdict = Some(Recalled {
+                last.verdict = Some(RecordedVerdict {
                     verdict: verdict.clone(),
                     finding: finding.clone(),
                     remarks: remarks.clone(),

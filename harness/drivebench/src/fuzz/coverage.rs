@@ -34,7 +34,7 @@ pub enum CoverageError {
         "failed to read {name}: {error}; a corpus is a folder with a folder for each target, and inputs in these"
     )]
     Unreadable {
-        /// Which.
+        /// The path of the folder or file.
         name: String,
         /// The system's error.
         error: std::io::Error,
@@ -42,7 +42,7 @@ pub enum CoverageError {
     /// A file cannot be written.
     #[error("failed to write {name}: {error}")]
     Unwritable {
-        /// Which.
+        /// The path of the file.
         name: String,
         /// The system's error.
         error: std::io::Error,
@@ -50,13 +50,13 @@ pub enum CoverageError {
     /// A file that no input can be, or more files than are taken.
     #[error("{name} is too large: an input has at most 1 MiB, a folder 100000 files")]
     TooLarge {
-        /// Which.
+        /// The path of the file or folder.
         name: String,
     },
     /// A file is no input.
     #[error("failed to read {name}: {error}")]
     Input {
-        /// The file.
+        /// The path of the file.
         name: String,
         /// What is wrong with it.
         error: InputError,
@@ -64,7 +64,7 @@ pub enum CoverageError {
     /// An input breaks a rule of the manual; the panic before this says which.
     #[error("{name} breaks a rule, see above; `cargo test --test bus corpora` plays it too")]
     Rule {
-        /// The file.
+        /// The path of the file.
         name: String,
     },
     /// There is no input.
@@ -80,7 +80,7 @@ pub enum CoverageError {
 pub struct InputReach {
     /// Target and file name.
     pub name: String,
-    /// What it reaches.
+    /// The transitions that it reaches.
     pub reached: Reached,
 }
 
@@ -99,7 +99,7 @@ pub struct Sum {
     pub of: Option<usize>,
 }
 
-/// What is reached.
+/// What a corpus reaches.
 #[derive(Clone, Debug)]
 pub struct Coverage {
     /// Each input of the targets that feed drives raw bytes, in order of names.

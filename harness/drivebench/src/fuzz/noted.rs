@@ -23,7 +23,6 @@ const STATEMENT: usize = 3;
 /// A text as a scenario: the statements of one that is taken, or the mistakes.
 ///
 /// # Panics
-/// As the target.
 pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
     scenario_body(data);
     let Ok(source) = Source::from_bytes("input.scn".to_owned(), data.to_vec()) else {
@@ -49,7 +48,6 @@ pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
 /// A text as a rig file: the keys of one that is taken, or the mistakes.
 ///
 /// # Panics
-/// As the target.
 pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
     rig_body(data);
     let Ok(source) = Source::from_bytes("input.toml".to_owned(), data.to_vec()) else {
@@ -67,7 +65,6 @@ pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
 /// Any bytes as a capture: which marks are in it and what it can be made into, or why it is none.
 ///
 /// # Panics
-/// As the target.
 pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     capture_body(data);
     let form = match data.iter().find(|byte| !byte.is_ascii_whitespace()) {
@@ -108,7 +105,6 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     });
 }
 
-/// How a byte came.
 fn arrival(byte: &LineByte) -> &'static str {
     match byte.arrival() {
         None => "a byte that did not arrive",
@@ -125,7 +121,6 @@ fn arrival(byte: &LineByte) -> &'static str {
 /// Any bytes as a run's record: its kinds of lines and what comes of judging it again, or why it is none.
 ///
 /// # Panics
-/// As the target.
 pub(crate) fn record(data: &[u8], notes: &mut Notebook<'_>) {
     evidence::fuzz::record(data);
     evidence::fuzz::noted(data, &mut |place, what| {

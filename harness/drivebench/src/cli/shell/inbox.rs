@@ -46,7 +46,7 @@ impl SessionItem {
 }
 
 #[derive(Default)]
-struct Waiting {
+struct RequestQueue {
     waiting: VecDeque<SessionItem>,
     under_way: Option<Value>,
     /// `cancel` or `stop` has ended the request under way.
@@ -56,7 +56,7 @@ struct Waiting {
 /// Requests that wait.
 #[derive(Clone)]
 pub(crate) struct RequestReader {
-    state: Arc<(Mutex<Waiting>, Condvar)>,
+    state: Arc<(Mutex<RequestQueue>, Condvar)>,
     /// Ends what is under way on the bus.
     interrupt: Arc<AtomicBool>,
 }
@@ -82,7 +82,7 @@ impl RequestReader {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Waiting> {
+    fn lock(&self) -> MutexGuard<'_, RequestQueue> {
         self.state.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -138,13 +138,12 @@ impl RequestReader {
         self.lock().under_way = Some(Value::Null);
     }
 
-    /// Whether nothing waits.
     pub(crate) fn is_empty(&self) -> bool {
         self.lock().waiting.is_empty()
     }
 
     /// Ends the request under way and takes back those that wait, or one of them.
-    fn break_off(&self, state: &mut Waiting, only: Option<&Value>) {
+    fn break_off(&self, state: &mut RequestQueue, only: Option<&Value>) {
         let meant = |id: &Value| only.is_none_or(|only| only == id);
         if state.under_way.as_ref().is_some_and(meant) {
             state.cancelled = true;
@@ -205,7 +204,7 @@ pub(super) fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Opti
 }
 
 /// What waits to be written.
-enum Unwritten {
+enum OutputItem {
     Text(String),
     /// All in front of it is written.
     Mark(SyncSender<()>),
@@ -232,7 +231,7 @@ impl Client {
 /// Lines that wait to be written.
 #[derive(Clone)]
 pub(crate) struct LineWriter {
-    lines: SyncSender<Unwritten>,
+    lines: SyncSender<OutputItem>,
     client: Arc<Client>,
 }
 
@@ -253,8 +252,8 @@ impl LineWriter {
         let thread = spawn(move || {
             for next in waiting {
                 let text: String = match next {
-                    Unwritten::Text(text) => text,
-                    Unwritten::Mark(done) => {
+                    OutputItem::Text(text) => text,
+                    OutputItem::Mark(done) => {
                         let _nobody_waits_any_more = done.send(());
                         continue;
                     }
@@ -303,7 +302,7 @@ impl LineWriter {
         let length = text.len();
         let unread = self.client.unread.fetch_add(length, Ordering::Relaxed);
         let fits = unread == 0 || unread + length <= MOST_UNREAD_BYTES;
-        if !fits || self.lines.try_send(Unwritten::Text(text)).is_err() {
+        if !fits || self.lines.try_send(OutputItem::Text(text)).is_err() {
             self.client.is_lost();
         }
     }
@@ -316,7 +315,7 @@ impl LineWriter {
     /// The same, and does something meanwhile, again and again: a bus must not stand still because a terminal does.
     pub(crate) fn wait_while(&self, mut meanwhile: impl FnMut()) {
         let (done, written) = sync_channel(1);
-        if self.lines.try_send(Unwritten::Mark(done)).is_err() {
+        if self.lines.try_send(OutputItem::Mark(done)).is_err() {
             return;
         }
         let end = Instant::now() + Duration::from_secs(1);
@@ -380,9 +379,9 @@ mod tests {
     }
 
     /// An output that takes nothing until its other end is dropped.
-    struct Blocked(std::sync::mpsc::Receiver<()>);
+    struct BlockedOutput(std::sync::mpsc::Receiver<()>);
 
-    impl Write for Blocked {
+    impl Write for BlockedOutput {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
             let _until_the_test_ends = self.0.recv();
             Ok(bytes.len())
@@ -399,7 +398,7 @@ mod tests {
         for (length, most) in [(10, MOST_UNREAD + 1), (1 << 20, 16), (40 << 20, 1)] {
             let (held, blocked) = channel();
             let interrupt = Arc::<AtomicBool>::default();
-            let (out, _) = LineWriter::write(Blocked(blocked), Arc::clone(&interrupt));
+            let (out, _) = LineWriter::write(BlockedOutput(blocked), Arc::clone(&interrupt));
             let line = "x".repeat(length);
             let taken = std::iter::repeat_with(|| out.text(line.as_str()));
             let taken = taken.take_while(|()| !out.is_stuck()).count();

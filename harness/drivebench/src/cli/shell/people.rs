@@ -101,10 +101,10 @@ impl LineEditor {
         let (turn, prompts) = sync_channel(1);
         spawn(move || {
             let next = |prompt: &str| match self.editor.readline(prompt) {
-                Ok(line) => Typed::Line(line),
-                Err(ReadlineError::Interrupted) => Typed::Stop,
+                Ok(line) => InputLine::Line(line),
+                Err(ReadlineError::Interrupted) => InputLine::Stop,
                 // Ctrl-D, a lost terminal, or one that cannot be read.
-                Err(_) => Typed::End,
+                Err(_) => InputLine::End,
             };
             take_lines(next, &prompts, &inbox, &out);
         });
@@ -121,17 +121,16 @@ pub(super) fn read_pipe(
     let (turn, prompts) = sync_channel(1);
     spawn(move || {
         let next = |_: &str| match super::inbox::next_line(&mut input) {
-            Ok(Some(Some(line))) => Typed::Line(String::from_utf8_lossy(&line).into_owned()),
-            Ok(Some(None)) => Typed::TooLong,
-            Ok(None) | Err(_) => Typed::End,
+            Ok(Some(Some(line))) => InputLine::Line(String::from_utf8_lossy(&line).into_owned()),
+            Ok(Some(None)) => InputLine::TooLong,
+            Ok(None) | Err(_) => InputLine::End,
         };
         take_lines(next, &prompts, &inbox, &out);
     });
     turn
 }
 
-/// What was read.
-enum Typed {
+enum InputLine {
     Line(String),
     /// A line of a pipe that is longer than any command.
     TooLong,
@@ -141,7 +140,7 @@ enum Typed {
 }
 
 fn take_lines(
-    mut next: impl FnMut(&str) -> Typed,
+    mut next: impl FnMut(&str) -> InputLine,
     prompts: &Receiver<String>,
     inbox: &RequestReader,
     out: &LineWriter,
@@ -151,10 +150,10 @@ fn take_lines(
         loop {
             line += 1;
             let request = match next(&prompt) {
-                Typed::End => return inbox.push_end(),
-                Typed::Stop => Ok(Some(SessionRequest::Stop { drive: None })),
-                Typed::TooLong => Err("the line is too long".to_owned()),
-                Typed::Line(text) => read_line(&text),
+                InputLine::End => return inbox.push_end(),
+                InputLine::Stop => Ok(Some(SessionRequest::Stop { drive: None })),
+                InputLine::TooLong => Err("the line is too long".to_owned()),
+                InputLine::Line(text) => read_line(&text),
             };
             match request {
                 Ok(Some(SessionRequest::End {})) => return inbox.push_end(),

@@ -100,7 +100,6 @@ pub(super) struct HeldSession {
     pub(super) motion: bool,
     /// A fault was injected. A scenario starts without it and would pass in spite of it.
     pub(super) struck: bool,
-    /// What is being captured.
     pub(super) capture: Option<SessionCapture>,
     pub(super) ended: Arc<AtomicBool>,
     pub(super) interrupt: Arc<AtomicBool>,
