@@ -148,11 +148,38 @@ impl Bench {
 }
 
 #[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
-fn right_drives_of_a_ring_have_no_deviations() {
-    let bench = Bench::ring("");
-    bench.equals_one_machine(0, "deviations: none; every byte is");
+fn parts_of_right_drives_equal_one_machine() {
+    right(
+        &Bench::frames(""),
+        "deviations: none; everything received is",
+    );
+}
+
+#[test]
+#[ignore = "takes two minutes; .ci/nightly runs it"]
+fn more_parts_of_right_drives_equal_one_machine() {
+    right(&Bench::ring(""), "deviations: none; every byte is");
+    right(
+        &Bench::octets(""),
+        "deviations: none; everything received is",
+    );
+}
+
+fn right(bench: &Bench, words: &str) {
+    bench.equals_one_machine(0, words);
     bench.is_open_without_a_part();
+}
+
+/// The deviation of a drive on frames shows in the second part alone, which the first part does not know.
+#[test]
+#[ignore = "takes three minutes; .ci/nightly runs it"]
+fn parts_name_the_deviation_of_one_machine() {
+    let wrong = Bench::frames("\"drive 1 deviates interval-one-more\"");
+    wrong.equals_one_machine(1, "deviation: drive 1: interval-one-more (UNITEK 5.2)");
+    let first = wrong.text("1", "deviations.txt");
+    assert!(first.starts_with("deviations: none;"), "{first}");
+    let wrong = Bench::octets("\"slave 8 deviates any-ident\"");
+    wrong.equals_one_machine(1, "deviation: slave 8: any-ident (NORDAC EN 2)");
 }
 
 /// ND21 10.1: the deviation shows in the second part alone, which the first part does not know.
@@ -194,38 +221,6 @@ fn a_deviation_fails_merged_parts_whose_scenarios_pass() {
     let merged = bench.merge(&["1", "2"], "merged");
     ended(&merged, 1, "2 passed, 0 failed");
     ended(&merged, 1, "deviation: drive 1: counts-7-zeros");
-}
-
-#[test]
-fn parts_on_frames_equal_one_machine() {
-    let bench = Bench::frames("");
-    bench.equals_one_machine(0, "deviations: none; everything received is");
-    bench.is_open_without_a_part();
-}
-
-/// The first part alone does not know the deviation.
-#[test]
-#[ignore = "takes half a minute; .ci/nightly runs it"]
-fn parts_on_frames_name_the_deviation_of_one_machine() {
-    let wrong = Bench::frames("\"drive 1 deviates interval-one-more\"");
-    wrong.equals_one_machine(1, "deviation: drive 1: interval-one-more (UNITEK 5.2)");
-    let first = wrong.text("1", "deviations.txt");
-    assert!(first.starts_with("deviations: none;"), "{first}");
-}
-
-#[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
-fn parts_on_octets_equal_one_machine() {
-    let bench = Bench::octets("");
-    bench.equals_one_machine(0, "deviations: none; everything received is");
-    bench.is_open_without_a_part();
-}
-
-#[test]
-#[ignore = "takes two minutes; .ci/nightly runs it"]
-fn parts_on_octets_name_the_deviation_of_one_machine() {
-    let wrong = Bench::octets("\"slave 8 deviates any-ident\"");
-    wrong.equals_one_machine(1, "deviation: slave 8: any-ident (NORDAC EN 2)");
 }
 
 /// Parts are of one qualification of one rig: the same file, the same scenarios, all of them qualified.

@@ -197,7 +197,10 @@ fn plain_output_has_no_escape_codes() {
             assert!(!shown.contains('\x1b'), "{shown}");
             let lines = if code == 0 { 3 } else { 0 };
             assert_eq!(shown.lines().count(), lines, "{shown}");
-            assert!(shown.is_empty() || shown.starts_with(drives.drive), "{shown}");
+            assert!(
+                shown.is_empty() || shown.starts_with(drives.drive),
+                "{shown}"
+            );
         }
     }
 }
