@@ -7,7 +7,7 @@ use super::output::Output;
 use super::rig_failure::{exit_of, exit_of_end, tell_end};
 use crate::link::Line as _;
 use crate::port::UNPROVEN_RATE;
-use crate::rig::port_session::PortSession;
+use crate::rig::session::RigSession;
 use crate::rig::{Rig, UseOptions};
 use serde_json::{Value, json};
 
@@ -32,7 +32,7 @@ pub(super) fn check<D: CommandDrives>(
     for_tools: bool,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let session = PortSession::<D>::open(rig, options);
+    let session = RigSession::<D>::open(rig, options);
     let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
     let (mut text, mut objects) = (String::new(), Vec::new());
     let mut exit = Exit::Passed;

@@ -13,7 +13,7 @@ use super::reading::{CellReading, show};
 use super::rig_name::Use;
 use super::watch::{WatchBench, WatchedCell, watch as show_again};
 use crate::link::Line as _;
-use crate::rig::port_session::PortSession;
+use crate::rig::session::RigSession;
 use harness_proto::time::{Instant, Span};
 use serde_json::{Map, Value, json};
 use std::slice::from_ref;
@@ -46,7 +46,7 @@ pub trait CommandDrives: HeldDrives {
     /// # Errors
     /// [`Failure`]: a drive does not answer as it must, or the port is lost.
     fn read(
-        session: &mut PortSession<Self>,
+        session: &mut RigSession<Self>,
         drives: &[Self::Drive],
         cells: &[Self::Cell],
     ) -> Result<Vec<Self::Reading>, Failure>;
@@ -56,16 +56,16 @@ pub trait CommandDrives: HeldDrives {
     /// # Errors
     /// [`Failure`]: a drive does not answer as it must, or the port is lost.
     fn info(
-        session: &mut PortSession<Self>,
+        session: &mut RigSession<Self>,
         drives: &[Self::Drive],
         output: &mut Output,
     ) -> Result<(Vec<DriveInfo>, Exit), Failure>;
 
     /// What `top` shows of them.
-    fn top(session: &PortSession<Self>) -> LineTop<Self>;
+    fn top(session: &RigSession<Self>) -> LineTop<Self>;
 
     /// Asks every drive for `rig check`, unless the bench only listens.
-    fn check(session: &mut PortSession<Self>) -> Vec<CheckedDrive>;
+    fn check(session: &mut RigSession<Self>) -> Vec<CheckedDrive>;
 }
 
 /// Runs a command.
@@ -165,7 +165,7 @@ fn watch<D: CommandDrives>(
 }
 
 struct WatchedDrives<'a, D: CommandDrives> {
-    session: &'a mut PortSession<D>,
+    session: &'a mut RigSession<D>,
     drives: Vec<D::Drive>,
     cells: &'a [D::Cell],
 }

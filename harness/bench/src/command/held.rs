@@ -11,7 +11,7 @@ use crate::link::{Line, Link, Trouble};
 use crate::medium::Medium;
 use crate::rig::playing::RigRun;
 use crate::rig::playing::run::{PortPlayer, PortRun};
-use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::session::{RigDrives, RigSession};
 use crate::rig::{End, Ends, PlayedScenario, Rig, SessionError, UseOptions};
 use crate::scenario::source::Source;
 use harness_proto::time::{Instant, Span};
@@ -119,7 +119,29 @@ pub fn record_from_now(link: &mut Guarded<Ends>, most: Option<u64>) {
 }
 
 /// What a session asks of the drives of a port.
-pub trait HeldDrives: PortDrives {
+pub trait HeldDrives: RigDrives {
+    /// What a drive is called, and what the stations share.
+    const WORDS: [&'static str; 2];
+
+    /// What stands for one of them.
+    type Drive: Copy + PartialEq;
+
+    /// The drives, in the order of the rig's file.
+    fn listed(&self) -> Vec<Self::Drive>;
+
+    /// The number of a drive.
+    fn number(drive: &Self::Drive) -> u8;
+
+    /// Drives in a sentence: `drive 1`, `drives 1, 2`.
+    fn named(drives: &[Self::Drive]) -> String {
+        let names: Vec<_> = drives
+            .iter()
+            .map(|drive| Self::number(drive).to_string())
+            .collect();
+        let s = if names.len() == 1 { "" } else { "s" };
+        format!("{}{s} {}", Self::WORDS[0], names.join(", "))
+    }
+
     /// The name of a drive's actual speed.
     const SPEED: &'static str;
 
@@ -140,7 +162,7 @@ pub trait HeldDrives: PortDrives {
     ///
     /// # Errors
     /// [`Failure`]: the port is lost.
-    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure>;
+    fn pass(session: &mut RigSession<Self>, time: Span) -> Result<(), Failure>;
 
     /// Forgets what a master knows of slaves: the conversation was broken off.
     fn forget(&self) {}
@@ -153,14 +175,14 @@ impl<D: HeldDrives> HeldPort<D> {
     /// Takes a rig, and looks at its interlocks.
     ///
     /// # Errors
-    /// See [`PortSession::open`].
+    /// See [`RigSession::open`].
     pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
-        let mut session = PortSession::open(rig, options)?;
+        let mut session = RigSession::open(rig, options)?;
         session.look_at_interlocks();
         Ok(Self(PortRun::on(session, options)))
     }
 
-    const fn session(&mut self) -> &mut PortSession<D> {
+    const fn session(&mut self) -> &mut RigSession<D> {
         self.0.session_mut()
     }
 }

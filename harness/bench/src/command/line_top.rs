@@ -13,14 +13,14 @@ use crate::command::drive::TopArguments;
 use crate::command::output::columns;
 use crate::counted::counted;
 use crate::link::{Line, Link};
-use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::session::RigSession;
 use crate::top::{HeadLine, Heading, Snapshot, TopForm, TopRow};
 use crate::web::{LiveNews, LivePicture, LiveRow};
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 
 /// What `top` shows of a bus, and how it reads it.
-pub struct LineTop<D: PortDrives> {
+pub struct LineTop<D: HeldDrives> {
     /// What the bench has, for the title of a page: `drives on ...`.
     pub what: &'static str,
     /// The table. Its first state is that of a drive that does not answer.
@@ -38,10 +38,10 @@ pub struct LineTop<D: PortDrives> {
 }
 
 /// Reads the row of a drive.
-type DriveReader<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<TopRow, Failure>;
+type DriveReader<D> = fn(&mut RigSession<D>, <D as HeldDrives>::Drive) -> Result<TopRow, Failure>;
 
 /// Stops a drive.
-type DriveStopper<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<String, Failure>;
+type DriveStopper<D> = fn(&mut RigSession<D>, <D as HeldDrives>::Drive) -> Result<String, Failure>;
 
 /// Shows all drives, a row each.
 ///
@@ -63,7 +63,7 @@ impl<D: HeldDrives> LineTop<D> {
     /// Shows drives: with `--once` one page, and without it live.
     fn show(
         self,
-        session: &mut PortSession<D>,
+        session: &mut RigSession<D>,
         arguments: &TopArguments,
         output: &mut Output,
     ) -> Result<Exit, Failure> {
@@ -108,7 +108,7 @@ impl<D: HeldDrives> LineTop<D> {
 /// The drives of a port.
 struct LineReader<'v, D: HeldDrives> {
     view: LineTop<D>,
-    session: &'v mut PortSession<D>,
+    session: &'v mut RigSession<D>,
     drives: Vec<D::Drive>,
     traffic: LineTraffic,
     arguments: &'v TopArguments,
@@ -211,7 +211,7 @@ impl<D: HeldDrives> LineReader<'_, D> {
 }
 
 /// What the line has carried since the last call.
-fn heard<D: HeldDrives>(session: &mut PortSession<D>) -> Vec<Piece> {
+fn heard<D: HeldDrives>(session: &mut RigSession<D>) -> Vec<Piece> {
     let record = HeldRecord::of(session.guarded(), 1);
     session.link().record(true);
     let tape = match session.rig().is_simulated() {

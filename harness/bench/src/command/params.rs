@@ -5,11 +5,12 @@ use super::drives::CommandDrives;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::file;
+use super::held::HeldDrives;
 use super::output::Output;
 use super::port_bench::{PortBench, on, single};
 use super::rig_name::Use;
 use crate::counted::counted;
-use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::session::RigSession;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use std::ops::Range;
@@ -22,18 +23,18 @@ pub enum EntryMistake {
 }
 
 /// Reads all parameters of a drive and returns the lines of a file.
-type Lines<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<Vec<String>, Failure>;
+type Lines<D> = fn(&mut RigSession<D>, <D as HeldDrives>::Drive) -> Result<Vec<String>, Failure>;
 
 /// Reads parameters of a drive and returns those that differ, each with a line that shows both values.
 type Compare<D, P> =
-    fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P]) -> Result<Vec<(P, String)>, Failure>;
+    fn(&mut RigSession<D>, <D as HeldDrives>::Drive, &[P]) -> Result<Vec<(P, String)>, Failure>;
 
 /// Writes parameters into a drive, and stores them if the last argument says so. If one of them is denied, nothing is written.
 type Write<D, P> =
-    fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P], bool) -> Result<(), Failure>;
+    fn(&mut RigSession<D>, <D as HeldDrives>::Drive, &[P], bool) -> Result<(), Failure>;
 
 /// The parameters of the drives of a bus: how they stand in a file, and what is done with them.
-pub struct ParameterFile<D: PortDrives, P> {
+pub struct ParameterFile<D: HeldDrives, P> {
     /// The table of the file.
     pub table: &'static str,
     /// How the first line of a file ends: what its keys and values are.
@@ -156,7 +157,7 @@ fn load<D: CommandDrives>(
 
 /// Shows the parameters that differ from those of a file, and returns them.
 fn differing<D: CommandDrives>(
-    session: &mut PortSession<D>,
+    session: &mut RigSession<D>,
     drive: D::Drive,
     wanted: &[D::Parameter],
     output: &mut Output,
@@ -172,7 +173,7 @@ fn read_file<D: CommandDrives>(arguments: &ParamsArguments) -> Result<Vec<D::Par
     Ok(D::PARAMETERS.parse(&source)?)
 }
 
-impl<D: PortDrives, P> ParameterFile<D, P> {
+impl<D: HeldDrives, P> ParameterFile<D, P> {
     /// The parameters of a file.
     ///
     /// # Errors

@@ -2,24 +2,25 @@
 
 use super::exit::Exit;
 use super::failure::Failure;
+use super::held::HeldDrives;
 use super::output::Output;
 use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use crate::command::axes::Axes;
 use crate::command::drive::RigArguments;
 use crate::command::rig_name::Use;
 use crate::link::Line as _;
-use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::session::{RigDrives, RigSession};
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use std::time::Duration;
 
 /// Where a command runs.
-pub enum PortBench<'b, D: PortDrives> {
+pub enum PortBench<'b, D: RigDrives> {
     /// On a rig that is taken for this command.
     Rig(&'b Rig),
     /// On a rig that a session holds.
-    Held(&'b mut PortSession<D>),
+    Held(&'b mut RigSession<D>),
 }
 
 /// Runs `act` on a bench. A rig is taken for it and given back: its drives stay as they are if `as_what` says so and `act` succeeds, or if
@@ -27,12 +28,12 @@ pub enum PortBench<'b, D: PortDrives> {
 ///
 /// # Errors
 /// [`Failure`]: the rig cannot be taken. Of a session also that of `act`.
-pub fn on<D: PortDrives>(
+pub fn on<D: RigDrives>(
     bench: PortBench<'_, D>,
     arguments: &RigArguments,
     as_what: Use,
     output: &mut Output,
-    act: impl FnOnce(&mut PortSession<D>, &mut Output) -> Result<Exit, Failure>,
+    act: impl FnOnce(&mut RigSession<D>, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
     let rig = match bench {
         PortBench::Rig(rig) => rig,
@@ -63,15 +64,15 @@ pub fn on<D: PortDrives>(
         alarm: alarm(),
         ..UseOptions::default()
     };
-    let session = PortSession::open(&rig, &options);
+    let session = RigSession::open(&rig, &options);
     let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
     session.look_at_interlocks();
     let result = act(&mut session, output);
     Ok(give_back(session, as_what, result, output))
 }
 
-fn give_back<D: PortDrives>(
-    mut session: PortSession<D>,
+fn give_back<D: RigDrives>(
+    mut session: RigSession<D>,
     as_what: Use,
     result: Result<Exit, Failure>,
     output: &mut Output,
@@ -96,9 +97,9 @@ fn give_back<D: PortDrives>(
 ///
 /// # Errors
 /// The rig has no such drive.
-pub fn select<D: PortDrives>(
+pub fn select<D: HeldDrives>(
     wanted: &[Axes],
-    session: &PortSession<D>,
+    session: &RigSession<D>,
 ) -> Result<Vec<D::Drive>, Failure> {
     let [drive, line] = D::WORDS;
     let all = session.drives().listed();
@@ -135,7 +136,7 @@ pub fn select<D: PortDrives>(
 ///
 /// # Errors
 /// The rig has no such drive, or several are meant.
-pub fn single<D: PortDrives>(wanted: &Axes, session: &PortSession<D>) -> Result<D::Drive, Failure> {
+pub fn single<D: HeldDrives>(wanted: &Axes, session: &RigSession<D>) -> Result<D::Drive, Failure> {
     match select(std::slice::from_ref(wanted), session)?[..] {
         [drive] => Ok(drive),
         _ => Err(Failure::refused(format!(

@@ -14,6 +14,17 @@ pub struct Taken {
     pub lock: Option<RigLock>,
 }
 
+impl Taken {
+    /// Runs the hook `before` and switches the power on.
+    pub(super) fn begin(rig: &Rig, lock: Option<RigLock>) -> Result<Self, SessionError> {
+        let around = Around::begin(rig).map_err(|error| SessionError::Hook {
+            rig: rig.id().to_owned(),
+            error,
+        })?;
+        Ok(Self { around, lock })
+    }
+}
+
 /// Takes a rig. A simulated one needs no lock.
 pub fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
     let forbidden = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
@@ -36,10 +47,7 @@ pub fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
         options.unless_interrupted(rig)?;
         Some(lock?)
     };
-    let around = Around::begin(rig).map_err(|error| SessionError::Hook {
-        rig: rig.id().to_owned(),
-        error,
-    })?;
+    let taken = Taken::begin(rig, lock)?;
     options.unless_interrupted(rig)?;
-    Ok(Taken { around, lock })
+    Ok(taken)
 }

@@ -11,10 +11,10 @@ use harness_bench::command::cyclic::{
 use harness_bench::command::drive::{MoveArguments, OutputForm, SelectArguments};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
+use harness_bench::command::held::HeldDrives as _;
 use harness_bench::command::output::Output;
 use harness_bench::command::port_bench::{PortBench, on as with, select, single};
 use harness_bench::command::rig_name::Use;
-use harness_bench::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
 use harness_proto::time::Span;

@@ -31,9 +31,20 @@ const BLOCK: (&str, Stop) = ("block", |driver, slave| driver.block(slave));
 const QUICK_STOP: (&str, Stop) = ("quick-stop", |driver, slave| driver.quick_stop(slave));
 
 impl HeldDrives for Inverters {
+    const WORDS: [&'static str; 2] = ["slave", "PROFIBUS segment"];
     const SPEED: &'static str = "HIW";
 
+    /// Its address.
+    type Drive = u8;
     type Player = Player;
+
+    fn listed(&self) -> Vec<u8> {
+        self.slaves.iter().map(|slave| slave.address).collect()
+    }
+
+    fn number(address: &u8) -> u8 {
+        *address
+    }
 
     fn perform(
         bench: PortBench<'_, Self>,

@@ -14,7 +14,7 @@ use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::playing::observed::Beats;
 use harness_bench::rig::playing::run::PortPlayer;
 use harness_bench::rig::playing::{Qualified, RecordedBench};
-use harness_bench::rig::port_session::setup_text;
+use harness_bench::rig::session::setup_text;
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{Outcome, Skip};
 use harness_bench::scenario::source::Source;

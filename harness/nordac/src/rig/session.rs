@@ -15,8 +15,8 @@ use harness_bench::port::UNPROVEN_RATE;
 use harness_bench::port::{PortAddress, PortSettings};
 use harness_bench::rig::lock::PortLock;
 use harness_bench::rig::port_file::Port;
-use harness_bench::rig::port_session::{
-    PortDrives, PortSession, failed, lock, patience, setup_text, unopened,
+use harness_bench::rig::session::{
+    OpenDrives, RigDrives, RigSession, failed, lock, patience, port_of, setup_text, unopened,
 };
 use harness_bench::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::nordac::guard::GuardedSlave;
@@ -25,24 +25,18 @@ use harness_proto::time::Span;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Inverters {
-    slaves: Vec<RigSlave>,
+    pub(crate) slaves: Vec<RigSlave>,
     patience: Span,
     /// The master, between two requests of a session.
     pub(crate) parked: ParkedDriver,
 }
 
 /// A rig in use.
-pub(crate) type Session = PortSession<Inverters>;
+pub(crate) type Session = RigSession<Inverters>;
 
-impl PortDrives for Inverters {
-    const WORDS: [&'static str; 2] = ["slave", "PROFIBUS segment"];
-    type Drive = u8;
-
-    fn open(
-        rig: &Rig,
-        port: &Port,
-        options: &UseOptions,
-    ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
+impl RigDrives for Inverters {
+    fn open(rig: &Rig, options: &UseOptions) -> Result<OpenDrives<Self>, SessionError> {
+        let port = port_of(rig)?;
         let slaves = slaves(port);
         let (ends, locks) = ends(rig, port, options)?;
         let known: Vec<GuardedSlave> = slaves.iter().copied().map(Into::into).collect();
@@ -62,19 +56,11 @@ impl PortDrives for Inverters {
     }
 
     /// Asks every slave for its diagnosis and its configuration, which changes nothing.
-    fn ready(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
+    fn ready(session: &mut Session, options: &UseOptions) -> Result<(), SessionError> {
         listen(session)?;
         // A simulated slave is there: what it does wrong is for verdicts.
-        let ill_as_well = ill_as_well || session.rig().is_simulated();
+        let ill_as_well = options.ill_as_well || session.rig().is_simulated();
         ask(session, ill_as_well)
-    }
-
-    fn listed(&self) -> Vec<u8> {
-        self.slaves.iter().map(|slave| slave.address).collect()
-    }
-
-    fn number(address: &u8) -> u8 {
-        *address
     }
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
@@ -86,8 +72,8 @@ impl PortDrives for Inverters {
         safe_state(line, &self.slaves, self.patience, standing)
     }
 
-    fn last_words(&self) -> Pieces {
-        Pieces::Octets(last_words(&self.slaves).concat())
+    fn last_words(&self) -> Vec<Pieces> {
+        vec![Pieces::Octets(last_words(&self.slaves).concat())]
     }
 }
 

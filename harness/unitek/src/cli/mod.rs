@@ -12,7 +12,7 @@ pub(crate) mod sim;
 mod write;
 
 use super::driver;
-use crate::rig::{OfUnitek as _, Player, Session, UnitekDrives};
+use crate::rig::{Axis, OfUnitek as _, Player, Session, UnitekDrives};
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
@@ -22,9 +22,19 @@ use harness_bench::command::port_bench::PortBench;
 use harness_proto::time::Span;
 
 impl HeldDrives for UnitekDrives {
+    const WORDS: [&'static str; 2] = ["drive", "CAN bus"];
     const SPEED: &'static str = "SPEED_ACTUAL";
 
+    type Drive = Axis;
     type Player = Player;
+
+    fn listed(&self) -> Vec<Axis> {
+        self.axes.clone()
+    }
+
+    fn number(axis: &Axis) -> u8 {
+        axis.node
+    }
 
     fn perform(
         bench: PortBench<'_, Self>,

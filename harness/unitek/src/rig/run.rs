@@ -17,7 +17,7 @@ use harness_bench::rig::playing::observed::Beats;
 use harness_bench::rig::playing::run::PortPlayer;
 use harness_bench::rig::playing::{Qualified, RecordedBench};
 use harness_bench::rig::port_file::Port;
-use harness_bench::rig::port_session::patience;
+use harness_bench::rig::session::patience;
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{Outcome, Skip};
 use harness_bench::scenario::source::Source;

@@ -12,8 +12,9 @@ use harness_bench::link::frames::{AdapterError, AdapterSettings, FrameLink};
 use harness_bench::medium::{Heard, Pieces};
 use harness_bench::rig::lock::PortLock;
 use harness_bench::rig::port_file::Port;
-use harness_bench::rig::port_session::{
-    PortDrives, PortSession, failed, lock, locked, patience, setup_text, unopened,
+use harness_bench::rig::session::{
+    OpenDrives, RigDrives, RigSession, failed, lock, locked, patience, port_of, setup_text,
+    unopened,
 };
 use harness_bench::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
@@ -28,24 +29,18 @@ const SPEEDS: [u8; 2] = [0xC8, 0x34];
 
 #[derive(Clone, Debug)]
 pub(crate) struct UnitekDrives {
-    axes: Vec<Axis>,
+    pub(crate) axes: Vec<Axis>,
     patience: Span,
     /// How a drive with another bit rate is reached, by the rig's file.
     way_back: Option<String>,
 }
 
 /// A rig in use.
-pub(crate) type Session = PortSession<UnitekDrives>;
+pub(crate) type Session = RigSession<UnitekDrives>;
 
-impl PortDrives for UnitekDrives {
-    const WORDS: [&'static str; 2] = ["drive", "CAN bus"];
-    type Drive = Axis;
-
-    fn open(
-        rig: &Rig,
-        port: &Port,
-        options: &UseOptions,
-    ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
+impl RigDrives for UnitekDrives {
+    fn open(rig: &Rig, options: &UseOptions) -> Result<OpenDrives<Self>, SessionError> {
+        let port = port_of(rig)?;
         let axes = axes(port);
         let (ends, locks) = if rig.is_simulated() {
             let setup = setup(port, &setup_text(rig));
@@ -68,9 +63,9 @@ impl PortDrives for UnitekDrives {
     }
 
     /// Asks every drive for its firmware.
-    fn ready(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
+    fn ready(session: &mut Session, options: &UseOptions) -> Result<(), SessionError> {
         listen(session)?;
-        ask(session, ill_as_well)
+        ask(session, options.ill_as_well)
     }
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
@@ -78,21 +73,13 @@ impl PortDrives for UnitekDrives {
             .map(|interlocks| Box::new(interlocks) as Box<dyn Watch>)
     }
 
-    fn listed(&self) -> Vec<Axis> {
-        self.axes.clone()
-    }
-
-    fn number(axis: &Axis) -> u8 {
-        axis.node
-    }
-
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {
         let way_back = self.way_back.as_deref();
         safe_state(line, &self.axes, self.patience, standing, way_back)
     }
 
-    fn last_words(&self) -> Pieces {
-        Pieces::Frames(last_words(&self.axes))
+    fn last_words(&self) -> Vec<Pieces> {
+        vec![Pieces::Frames(last_words(&self.axes))]
     }
 }
 

@@ -5,7 +5,7 @@ use crate::explore::{ExploreError, Rehearsal, Target, Tried};
 use crate::guard::OVERDUE;
 use crate::link::{Line as _, Link as _, Trouble};
 use crate::rig::Rig;
-use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::session::{RigDrives, RigSession};
 use harness_proto::time::Span;
 
 /// How long a line is listened to behind a conversation at least.
@@ -18,7 +18,7 @@ const LONGEST_REST: Span = Span::from_millis(1_000);
 pub const ONLY_SIMULATED: &str = "only on simulated drives";
 
 /// A rig in use, of the drives of a bus.
-pub(crate) type SessionOf<B> = PortSession<<B as LineRig>::Drives>;
+pub(crate) type SessionOf<B> = RigSession<<B as LineRig>::Drives>;
 
 /// A bus whose drives are explored behind adapters.
 ///
@@ -26,7 +26,7 @@ pub(crate) type SessionOf<B> = PortSession<<B as LineRig>::Drives>;
 /// decides. Times are not judged, since a busy computer delays what it reads.
 pub trait LineRig: LineBus {
     /// The drives of a session.
-    type Drives: PortDrives;
+    type Drives: RigDrives;
     /// What is known while a rig is explored.
     type Kept: std::fmt::Debug;
 
@@ -109,7 +109,7 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
 }
 
 /// Lets time pass on a line.
-pub fn pass<D: PortDrives>(session: &mut PortSession<D>, time: Span) {
+pub fn pass<D: RigDrives>(session: &mut RigSession<D>, time: Span) {
     let link = session.link();
     let until = link.now() + time;
     while link.now() < until && link.trouble().is_none() {

@@ -3,7 +3,7 @@
 use super::LineBus;
 use crate::explore::ExploreError;
 use crate::rig::Rig;
-use crate::rig::port_session::setup_lines;
+use crate::rig::session::setup_lines;
 use crate::scenario::source::Source;
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@ use crate::bus_name::BusName;
 use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
-use crate::rig::port_session::{PortDrives, PortSession, failed};
+use crate::rig::session::{RigDrives, RigSession, failed};
 use crate::rig::{
     Again, Attempt, End, Keeper, PlayedScenario, Rig, SessionError, UseOptions, attempts_of,
 };
@@ -30,7 +30,7 @@ pub trait PortPlayer: Sized {
     const ANEW: bool;
 
     /// The drives of a rig.
-    type Drives: PortDrives;
+    type Drives: RigDrives;
 
     /// A scenario, read for a rig.
     type Own;
@@ -79,8 +79,7 @@ pub trait PortPlayer: Sized {
     fn attempt(&mut self, own: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
 
     /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
-    fn set_back(&mut self, own: &Self::Own, session: &mut PortSession<Self::Drives>)
-    -> Vec<String>;
+    fn set_back(&mut self, own: &Self::Own, session: &mut RigSession<Self::Drives>) -> Vec<String>;
 
     /// The scenarios that a qualification plays behind the selected ones.
     fn conversations(rig: &Rig) -> Vec<Source>;
@@ -92,7 +91,7 @@ pub trait PortPlayer: Sized {
 
 /// A rig in use.
 pub struct PortRun<P: PortPlayer> {
-    session: PortSession<P::Drives>,
+    session: RigSession<P::Drives>,
     options: UseOptions,
     player: P,
     again: Again,
@@ -115,11 +114,11 @@ impl<P: PortPlayer> PortRun<P> {
             let why = "scenarios send, and its file says `listen_only = true`; set it to false";
             return Err(failed(rig, why));
         }
-        Ok(Self::on(PortSession::open(rig, options)?, options))
+        Ok(Self::on(RigSession::open(rig, options)?, options))
     }
 
     /// Takes a rig that is open, of whose drives nothing is known.
-    pub fn on(mut session: PortSession<P::Drives>, options: &UseOptions) -> Self {
+    pub fn on(mut session: RigSession<P::Drives>, options: &UseOptions) -> Self {
         let mut player = P::new(session.rig(), options.allow_motion, options.ill_as_well);
         player.shows_life(session.beats());
         player.tells(session.left().clone());
@@ -136,12 +135,12 @@ impl<P: PortPlayer> PortRun<P> {
     }
 
     /// The rig.
-    pub const fn session(&self) -> &PortSession<P::Drives> {
+    pub const fn session(&self) -> &RigSession<P::Drives> {
         &self.session
     }
 
     /// The same, to be used between scenarios.
-    pub const fn session_mut(&mut self) -> &mut PortSession<P::Drives> {
+    pub const fn session_mut(&mut self) -> &mut RigSession<P::Drives> {
         &mut self.session
     }
 
@@ -183,7 +182,7 @@ impl<P: PortPlayer> PortRun<P> {
 
     /// Takes simulated drives that were just switched on.
     fn restart(&mut self) {
-        match PortSession::open(self.session.rig(), &self.options) {
+        match RigSession::open(self.session.rig(), &self.options) {
             Ok(fresh) => {
                 let _simulated = std::mem::replace(&mut self.session, fresh).release();
             }

@@ -268,7 +268,7 @@ fn what_does_not_end_has_foretold_what_it_changes() {
                 let safe = said.starts_with("safe state: every drive is locked");
                 assert!(safe, "{said}");
             } else {
-                for pieces in run.session().last_words()() {
+                for pieces in run.session().last_words()(0) {
                     run.session_mut().link().send(0, pieces.as_out());
                 }
                 pass(&mut run);

@@ -1,4 +1,4 @@
-//! A rig with a port in use, whatever its bus: locked, opened, guarded, and taken to its safe state on every way out.
+//! A rig in use, whatever its bus: locked, opened, guarded, and taken to its safe state on every way out.
 
 use super::left::NotPutBack;
 use super::lock::{PortLock, PortLockError};
@@ -8,7 +8,7 @@ use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep, Watch};
-use crate::link::{Line, Trouble};
+use crate::link::{Line, PortLink, Trouble};
 use crate::medium::{Heard, Pieces};
 use crate::port::OpenError;
 use crate::scenario::source::Source;
@@ -24,64 +24,46 @@ const LISTEN: Span = Span::from_millis(150);
 const LOSSES: Span = Span::from_millis(300);
 
 /// What a session asks of the bus of its drives.
-pub trait PortDrives: Clone + std::fmt::Debug + 'static {
-    /// What a drive is called, and what the stations share.
-    const WORDS: [&'static str; 2];
-
-    /// What stands for one of them.
-    type Drive: Copy + PartialEq;
-
-    /// Opens the drives of a rig that is taken, behind a gate: simulated ones, or an adapter with its lock. Nothing is sent.
+pub trait RigDrives: std::fmt::Debug + Sized + 'static {
+    /// Opens the drives of a rig that is taken, behind a gate: simulated ones, or ports with their locks. Nothing is sent.
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
-    fn open(
-        rig: &Rig,
-        port: &Port,
-        options: &UseOptions,
-    ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError>;
+    fn open(rig: &Rig, options: &UseOptions) -> Result<OpenDrives<Self>, SessionError>;
 
-    /// Finds out whether the drives of an open rig can be used; even `ill_as_well` where a drive does not answer.
+    /// Listens to the drives of an open rig, and finds out whether they can be used.
     ///
     /// # Errors
-    /// Why they cannot be used.
-    fn ready(session: &mut PortSession<Self>, ill_as_well: bool) -> Result<(), SessionError>;
+    /// Why they cannot be used. After [`SessionError::Interrupted`] they are taken to their safe state.
+    fn ready(session: &mut RigSession<Self>, options: &UseOptions) -> Result<(), SessionError>;
 
     /// What watches the interlocks of the rig's file; `None` where it has none.
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>>;
 
-    /// The drives, in the order of the rig's file.
-    fn listed(&self) -> Vec<Self::Drive>;
-
-    /// The number of a drive.
-    fn number(drive: &Self::Drive) -> u8;
-
-    /// Drives in a sentence: `drive 1`, `drives 1, 2`.
-    fn named(drives: &[Self::Drive]) -> String {
-        let names: Vec<_> = drives
-            .iter()
-            .map(|own| Self::number(own).to_string())
-            .collect();
-        let s = if names.len() == 1 { "" } else { "s" };
-        format!("{}{s} {}", Self::WORDS[0], names.join(", "))
-    }
-
     /// Takes every drive to its safe state and reads it back.
-    fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe;
+    fn safe_state(&self, link: &mut Guarded<Ends>, standing: &Standstill) -> Safe;
 
-    /// What stops every drive without waiting for anything: for a watchdog.
-    fn last_words(&self) -> Pieces;
+    /// What stops every drive without waiting for anything, port by port: for a watchdog.
+    fn last_words(&self) -> Vec<Pieces>;
+
+    /// The last that is done before the rig is given back. `safe` tells whether the drives were seen in their safe state; it is `None` where
+    /// they stay as they are. Returns what is left to say.
+    fn leave(_session: &mut RigSession<Self>, _safe: Option<bool>) -> Vec<String> {
+        Vec::new()
+    }
 }
+
+/// Drives of a rig that is taken, their guarded link, and the locks of its ports.
+pub type OpenDrives<D> = (D, Guarded<Ends>, Vec<PortLock>);
 
 /// A rig in use.
 #[derive(Debug)]
-pub struct PortSession<D: PortDrives> {
+pub struct RigSession<D: RigDrives> {
     rig: Rig,
     link: Guarded<Ends>,
     drives: D,
     /// When the longest run is over.
     deadline: Option<Instant>,
-    listen_only: bool,
     /// The drives are as they are to be left.
     ended: bool,
     left: NotPutBack,
@@ -91,51 +73,57 @@ pub struct PortSession<D: PortDrives> {
     taken: Taken,
 }
 
-impl<D: PortDrives> PortSession<D> {
-    /// Takes a rig: lock, hook, port. Listens first. Then finds out whether its drives can be used, unless the file says `listen_only`.
+impl<D: RigDrives> RigSession<D> {
+    /// Takes a rig: lock, hook, ports. Then finds out whether its drives can be used.
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
     pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
-        let port = rig
-            .port()
-            .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
         let taken = take(rig, options)?;
-        let deadline = rig.deadline(Instant::now());
-        let (drives, link, locks) = D::open(rig, port, options)?;
+        let left = NotPutBack::of(rig);
+        Self::over(rig, options, (taken, left), D::open(rig, options)?)
+    }
+
+    /// Over drives that are open, of a rig without a lock.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    #[cfg(any(test, feature = "trials"))]
+    pub fn over_open(
+        rig: &Rig,
+        options: &UseOptions,
+        open: OpenDrives<D>,
+    ) -> Result<Self, SessionError> {
+        let taken = Taken::begin(rig, None)?;
+        Self::over(rig, options, (taken, NotPutBack::default()), open)
+    }
+
+    fn over(
+        rig: &Rig,
+        options: &UseOptions,
+        (taken, left): (Taken, NotPutBack),
+        (drives, link, locks): OpenDrives<D>,
+    ) -> Result<Self, SessionError> {
         let mut session = Self {
             rig: rig.clone(),
             link,
             drives,
-            deadline,
-            listen_only: port.listen_only,
+            deadline: rig.deadline(Instant::now()),
             // Nothing has been moved: there is nothing to make safe while the drives have not been found ready.
             ended: true,
             watchdog: None,
-            left: NotPutBack::of(rig),
+            left,
             _locks: locks,
             taken,
         };
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
         }
-        match D::ready(&mut session, options.ill_as_well) {
-            Err(_) if session.link.trouble() == Some(&Trouble::Interrupted) => {
-                session.ended = session.listen_only;
-                let end = Some(Box::new(session.end(false)));
-                let rig = rig.id().to_owned();
-                return Err(SessionError::Interrupted { rig, end });
-            }
-            Err(SessionError::Drives { rig, why }) => {
-                let why = [Some(why), session.left.before()];
-                let why: Vec<_> = why.into_iter().flatten().collect();
-                let why = why.join("; ");
-                return Err(SessionError::Drives { rig, why });
-            }
-            other => other?,
+        if let Err(error) = D::ready(&mut session, options) {
+            return Err(session.unready(error));
         }
         session.taken.around.used();
-        session.ended = session.listen_only || rig.is_simulated();
+        session.ended = session.listens_only() || rig.is_simulated();
         let watch = session.drives.watch(rig);
         session.link.set_watch(watch);
         session.link.set_deadline(session.deadline);
@@ -143,7 +131,30 @@ impl<D: PortDrives> PortSession<D> {
         Ok(session)
     }
 
-    /// Listens before anything is sent: a bench must not disturb another master. Simulated drives are alone.
+    /// Gives a rig back whose drives cannot be used. An interrupted program takes them to their safe state.
+    fn unready(mut self, error: SessionError) -> SessionError {
+        let interrupted = self.link.trouble() == Some(&Trouble::Interrupted);
+        match error {
+            _ if interrupted || matches!(error, SessionError::Interrupted { .. }) => {
+                self.ended = self.listens_only();
+                SessionError::Interrupted {
+                    rig: self.rig.id().to_owned(),
+                    end: Some(Box::new(self.end(false))),
+                }
+            }
+            SessionError::Drives { rig, why } => {
+                let why: Vec<_> = [Some(why), self.left.before()]
+                    .into_iter()
+                    .flatten()
+                    .collect();
+                let why = why.join("; ");
+                SessionError::Drives { rig, why }
+            }
+            other => other,
+        }
+    }
+
+    /// Listens to a shared line before anything is sent: a bench must not disturb another master. Simulated drives are alone.
     ///
     /// # Errors
     /// The link is in trouble.
@@ -171,10 +182,16 @@ impl<D: PortDrives> PortSession<D> {
         &self.rig
     }
 
+    /// Whether this program holds the lock of the rig: not of a simulated one.
+    #[must_use]
+    pub const fn is_locked(&self) -> bool {
+        self.taken.lock.is_some()
+    }
+
     /// Whether nothing is ever sent.
     #[must_use]
-    pub const fn listens_only(&self) -> bool {
-        self.listen_only
+    pub fn listens_only(&self) -> bool {
+        self.rig.port().is_some_and(|port| port.listen_only)
     }
 
     /// What is known of its drives.
@@ -204,9 +221,14 @@ impl<D: PortDrives> PortSession<D> {
         &self.link
     }
 
+    /// Its ports' link, if it has ports: for what was measured there.
+    pub fn ports(&mut self) -> Option<&mut dyn PortLink> {
+        self.link.inner_mut().ports_mut()
+    }
+
     /// Waits as long as an adapter may take to report a loss, at ports.
     pub(crate) fn hear_of_losses(&mut self) {
-        if self.link.inner().ports().is_none() {
+        if self.ports().is_none() {
             return;
         }
         let end = self.link.now() + LOSSES;
@@ -217,13 +239,12 @@ impl<D: PortDrives> PortSession<D> {
 
     /// Line errors and losses that the transport has reported without their place since the last call.
     pub fn take_unplaced(&mut self) -> u64 {
-        let ports = self.link.inner_mut().ports_mut();
-        ports.map_or(0, |ports| ports.take_unplaced())
+        self.ports().map_or(0, |ports| ports.take_unplaced())
     }
 
     /// The same, and what may have been lost.
     pub fn take_doubtful(&mut self) -> u64 {
-        let ports = self.link.inner_mut().ports_mut();
+        let ports = self.ports();
         ports.map_or(0, |ports| ports.take_unplaced() + ports.take_doubtful())
     }
 
@@ -278,7 +299,7 @@ impl<D: PortDrives> PortSession<D> {
     /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.
     pub fn resume(&mut self) {
         self.link.clear_the_way();
-        if let Some(ports) = self.link.inner_mut().ports_mut() {
+        if let Some(ports) = self.ports() {
             ports.resume();
         }
         self.link.reset_after_denial();
@@ -291,32 +312,30 @@ impl<D: PortDrives> PortSession<D> {
 
     /// What shows the watchdog that the program works.
     pub fn beats(&mut self) -> Beats {
-        let ports = self.link.inner_mut().ports_mut();
-        ports.map_or_else(Beats::default, |own| Beats::of(own.beats()))
+        let ports = self.ports();
+        ports.map_or_else(Beats::default, |ports| Beats::of(ports.beats()))
     }
 
     /// Lets a thread watch that the program lives.
     fn watched(&mut self, alarm: Alarm) -> Result<Option<Watchdog>, SessionError> {
-        if self.listen_only {
+        if self.listens_only() {
             return Ok(None);
         }
         let (words, alarm) = (self.last_words(), alarm.telling(self.left.clone()));
-        let Some(ports) = self.link.inner_mut().ports_mut() else {
+        let Some(ports) = self.ports() else {
             return Ok(None);
         };
-        let own = ports.last_words().map_err(SessionError::Watchdog)?;
-        let words = move |_| words();
-        watch_over(&self.rig, ports.beats(), (own, words), alarm).map(Some)
+        let (said, beats) = (ports.last_words(), ports.beats());
+        let said = said.map_err(SessionError::Watchdog)?;
+        watch_over(&self.rig, beats, (said, words), alarm).map(Some)
     }
 
-    /// What stops every drive without waiting for anything: where the rig's file has it, and then where a scenario may have moved it.
-    pub fn last_words(&self) -> impl Fn() -> Vec<Pieces> + Send + use<D> {
-        let (own, left) = (self.drives.last_words(), self.left.clone());
-        move || {
-            [Some(own.clone()), left.stops()]
-                .into_iter()
-                .flatten()
-                .collect()
+    /// What stops every drive of a port without waiting for anything: where the rig's file has it, and then where a scenario may have moved it.
+    pub fn last_words(&self) -> impl Fn(usize) -> Vec<Pieces> + Send + use<D> {
+        let (words, left) = (self.drives.last_words(), self.left.clone());
+        move |port| {
+            let words = words.get(port).cloned();
+            words.into_iter().chain(left.stops()).collect()
         }
     }
 
@@ -342,29 +361,38 @@ impl<D: PortDrives> PortSession<D> {
             power: Vec::new(),
             remarks: Vec::new(),
         };
-        let wanted = self.rig.file.safe_state.clone();
-        if !std::mem::replace(&mut self.ended, true) {
+        if std::mem::replace(&mut self.ended, true) {
+            end.remarks = D::leave(self, None);
+            self.watchdog = None;
+        } else {
             self.resume();
+            let wanted = self.rig.file.safe_state.clone();
             let standing = standing(&wanted);
             if !standing.order.is_empty() {
                 end.safe = Some(self.drives.safe_state(&mut self.link, &standing));
             }
+            let safe = end.safe.as_ref().is_some_and(|safe| safe.confirmed);
+            end.remarks = D::leave(self, Some(safe));
             self.watchdog = None;
             if wanted.order.contains(&file::SafeStep::PowerOff) {
                 end.power = self.taken.around.power_off();
             }
         }
-        end.remarks = self.taken.around.end(error);
+        end.remarks.extend(self.taken.around.end(error));
         end
     }
-}
 
-impl<D: PortDrives> PortSession<D> {
     /// Takes the drives of a session that was not closed to their safe state. Returns what is to be said.
     fn abandon(&mut self) -> Vec<String> {
         let end = self.end(true);
         let safe = end.safe.iter().map(ToString::to_string);
-        safe.chain(self.left.all()).collect()
+        let mut words: Vec<_> = safe.chain(end.power).chain(end.remarks).collect();
+        for note in self.left.all() {
+            if !words.contains(&note) {
+                words.push(note);
+            }
+        }
+        words
     }
 
     /// The same of a session over simulated drives, as if they were behind a port.
@@ -375,7 +403,7 @@ impl<D: PortDrives> PortSession<D> {
     }
 }
 
-impl<D: PortDrives> Drop for PortSession<D> {
+impl<D: RigDrives> Drop for RigSession<D> {
     /// A panic unwinds through here.
     fn drop(&mut self) {
         if !self.ended {
@@ -400,6 +428,14 @@ pub fn setup_text(rig: &Rig) -> Source {
         name: rig.origin.clone(),
         text: setup_lines(rig).join("\n").into(),
     }
+}
+
+/// The port of a rig on a shared line.
+///
+/// # Errors
+/// It has none.
+pub fn port_of(rig: &Rig) -> Result<&Port, SessionError> {
+    rig.port().ok_or_else(|| failed(rig, "it has no [port.1]"))
 }
 
 /// How long a reply may take, by a rig's file.
