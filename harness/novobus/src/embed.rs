@@ -6,9 +6,9 @@ use crate::drives::{released_header, simulated, units_of};
 use crate::language::argument::{assignments, cells, encode};
 use crate::language::plan::Plan;
 use crate::link::SimulatedLink;
-use crate::rig::Session;
 use crate::rig::shared::Shared;
 use crate::rig::sim::RigOfRings as _;
+use crate::rig::{OfRings as _, session};
 use crate::serve::Server;
 use harness_bench::embed::{AxisCommand, AxisDrives, Embedding, Error, Reading};
 use harness_bench::medium::ErrorMarks;
@@ -96,7 +96,7 @@ impl Drives {
             allow_motion,
             ..UseOptions::default()
         };
-        let session = Session::open(rig, &options)?;
+        let session = session::open(rig, &options)?;
         let sizes = session.rings().to_vec();
         let shared = Shared::new(session);
         let opened = OpenRings::open(Box::new(shared.line()), &sizes, driver::Options::default());

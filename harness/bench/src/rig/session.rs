@@ -355,7 +355,8 @@ impl<D: RigDrives> RigSession<D> {
         self.end(error)
     }
 
-    fn end(&mut self, error: bool) -> End {
+    /// The same of a session that is dropped soon.
+    pub fn end(&mut self, error: bool) -> End {
         let mut end = End {
             safe: None,
             power: Vec::new(),

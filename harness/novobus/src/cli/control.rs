@@ -4,7 +4,7 @@ use super::axes;
 use super::rig::{self, OpenBench};
 use crate::driver::{Axis, Error, OpenRings};
 use crate::language::run::over_bus::reset_drives;
-use crate::rig::Session;
+use crate::rig::{OfRings as _, Session};
 use harness_bench::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;

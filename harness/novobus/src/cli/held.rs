@@ -6,9 +6,11 @@ use crate::language::plan::{Plan, PlannedStep, RingAct};
 use crate::language::read::RingScenario;
 use crate::language::run::now::{Now, now};
 use crate::link::BesideTheBus;
+use crate::rig::put_back::put_back;
+use crate::rig::session;
 use crate::rig::shared::Shared;
 use crate::rig::sim::RigOfRings;
-use crate::rig::{Run, Session};
+use crate::rig::{OfRings as _, Run, Session};
 use harness_bench::bus_name::BusName;
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::exit::Exit;
@@ -49,7 +51,7 @@ pub(super) fn hold(
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
     let plan = rig.plan()?;
-    let rig = Shared::new(Session::open(rig, options).map_err(unusable)?);
+    let rig = Shared::new(session::open(rig, options).map_err(unusable)?);
     let mut held = HeldRings {
         rig,
         plan,
@@ -174,7 +176,7 @@ impl HeldBench for HeldRings {
             let played = Run::new(session)?.play(plan, None);
             // What is written between scenarios is meant to stay.
             let ended = session.link().trouble().is_some_and(Trouble::ends_a_run);
-            let notes = session.put_back(!ended);
+            let notes = put_back(session, !ended);
             let mut played = played.map_err(unusable)?;
             played.outcome.remarks.extend(notes);
             Ok(played)

@@ -3,6 +3,7 @@
 
 use super::rig;
 use crate::driver::{self, Axis, Recovery, SpelledOut, SpellingCause};
+use crate::rig::OfRings as _;
 use harness_bench::command::drive::{OutputForm, RecoverArguments};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
@@ -24,7 +25,7 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
     let rig = rig::named(&arguments.rig)?;
     let mut session = rig::take(rig, &arguments.rig, Use::look("recover"), true)?;
     let rings = session.rings().len();
-    let before = session.opening().cloned();
+    let before = session.drives().opening.clone();
     let mut found = every(session.link(), rings);
     // What drives spelled out before the rig was opened.
     for (ring, spelled) in before.into_iter().flat_map(|health| health.reported) {

@@ -7,9 +7,10 @@ use crate::drives;
 use crate::language::parse::header::parse_setup;
 use crate::language::plan::Plan;
 use crate::link::SimulatedLink;
-use crate::rig::Session;
+use crate::rig::session;
 use crate::rig::shared::Shared;
 use crate::rig::sim::RigOfRings;
+use crate::rig::{OfRings as _, Session};
 use harness_bench::command::drive::RigArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
@@ -274,7 +275,7 @@ pub(crate) fn take(
         interrupt: interrupt_flag(),
         alarm: alarm(),
     };
-    Session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
+    session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
 }
 
 /// The rig that has been found for a command.
@@ -339,10 +340,10 @@ pub(crate) fn give_back_session(
     output: &mut Output,
 ) -> (End, Exit) {
     let exit = exit_of_end(session.link().trouble(), exit, output);
-    let end = match exit {
-        Exit::RigError | Exit::Interlock => session.close_with_error(),
-        _ => session.close(),
-    };
+    let end = session::close(
+        &mut session,
+        matches!(exit, Exit::RigError | Exit::Interlock),
+    );
     let exit = tell_end(&end, exit, output);
     (end, exit)
 }

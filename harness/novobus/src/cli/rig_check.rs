@@ -1,8 +1,8 @@
 //! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
 
 use crate::driver::{Error, SpelledOut, SpellingCause};
-use crate::rig::Session;
 use crate::rig::figures::{Figures, RingFigures, WrongParity, measure};
+use crate::rig::session;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
@@ -22,7 +22,7 @@ pub(crate) fn check(
     for_tools: bool,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let session = Session::open(rig, options).map_err(unusable)?;
+    let session = session::open(rig, options).map_err(unusable)?;
     let all = rig.rings().map(|(_, ring)| usize::from(ring.drives)).sum();
     let bar = progress_bar(all, output.progress);
     let measured = measure(session, &mut |axis| {

@@ -14,7 +14,7 @@ use crate::language::run::over_bus::start_anew;
 use crate::link::BesideTheBus;
 use crate::link::SimulatedLink;
 use crate::rig::sim::RigOfRings;
-use crate::rig::{Run, examine};
+use crate::rig::{OfRings as _, Run, examine};
 use crate::simulate;
 use crate::twin::SILENCED;
 use harness_bench::explore::ExploreError;

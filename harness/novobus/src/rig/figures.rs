@@ -6,7 +6,7 @@ use super::shared::Shared;
 pub(crate) use super::wrong_parity::WrongParity;
 use super::wrong_parity::try_wrong_parity;
 use crate::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut};
-use crate::rig::Session;
+use crate::rig::session::{OfRings as _, Session};
 use harness_bench::link::{Line as _, Octets};
 use harness_bench::rig::End;
 use harness_bench::rig::Rig;
@@ -84,7 +84,11 @@ pub(crate) fn measure(
     mut session: Session,
     told: &mut dyn FnMut(Axis),
 ) -> (Result<Figures, driver::Error>, Option<End>) {
-    let reported = session.opening().map(|health| health.reported.clone());
+    let reported = session
+        .drives()
+        .opening
+        .as_ref()
+        .map(|health| health.reported.clone());
     let sizes = session.rings().to_vec();
     let rings = (0..)
         .zip(&sizes)

@@ -16,7 +16,7 @@ pub(crate) mod judge;
 pub(crate) mod line_test;
 pub(crate) mod open;
 mod permitted;
-mod put_back;
+pub(crate) mod put_back;
 mod reach;
 mod ring_judge;
 mod ring_run;
@@ -38,7 +38,7 @@ pub(crate) use ring_run::RingRun;
 pub(crate) use run::Run;
 #[cfg(test)]
 pub(crate) use run::{Way, play_one};
-pub(crate) use session::Session;
+pub(crate) use session::{OfRings, Session};
 pub(crate) use sim::RINGS;
 
 /// Reads the file of a rig with rings.

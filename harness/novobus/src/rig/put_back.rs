@@ -4,7 +4,7 @@
 //! error until it is confirmed (14.10.1). A reset at the end would lose what was in RAM alone before the run (12.7), so each cell that differs
 //! is written. Positions, orders and what the drive's program works in are not put back: they are the drive's own.
 
-use super::session::{Session, come_round};
+use super::session::{OfRings as _, Session, come_round};
 use crate::driver::{Axis, Error, OpenRings, Options, Width};
 use crate::gate::GuardsRings as _;
 use crate::guard::safe_state::telegram;
@@ -230,114 +230,117 @@ fn is_of_the_bus(code: u16) -> bool {
     (0x0501..=0x0508).contains(&code)
 }
 
-impl Session {
-    /// Scenarios are about to be played: says what a run before, which was killed, has left.
-    pub(super) fn begin(&mut self) {
-        self.before.earlier = self.left.take_before();
-    }
+/// Scenarios are about to be played: says what a run before, which was killed, has left.
+pub(super) fn begin(session: &mut Session) {
+    session.drives_mut().before.earlier = session.left().take_before();
+}
 
-    /// Reads what a scenario may change of the drives, where it has not been read: nothing of it is recorded. Where drives may be in the middle
-    /// of something, their rings are recovered first if that `may_recover`.
-    pub(super) fn remember(&mut self, touched: &BTreeSet<(Axis, Touched)>, may_recover: bool) {
-        if self.rig().is_simulated() {
-            return;
-        }
-        let first = self.before.errors.is_none();
-        if first {
-            let _of_others = self.link().take_touched();
-        }
-        let all = touched
-            .iter()
-            .flat_map(|(axis, touched)| places(*touched).into_iter().map(|own| (*axis, own)));
-        let mut wanted: BTreeSet<_> = all.collect();
-        wanted.retain(|place| !self.before.values.contains_key(place));
-        if !first && wanted.is_empty() {
-            return;
-        }
-        if !self.link().at_rest() && may_recover {
-            // What is wrong with the rings is said by the examination in front of the scenario.
-            let _examined = self.examined();
-        }
-        if self.link().at_rest() {
-            let (rings, axes) = (self.rings().to_vec(), self.axes());
-            let read = self.link().aside(|link| {
-                with_bus(link, &rings, |bus| {
-                    let errors = first.then(|| errors(bus, &axes)).transpose()?;
-                    Ok((read(bus, &wanted)?, errors))
-                })
-            });
-            // What was not read is said at the end, if it was changed.
-            if let Ok((values, errors)) = read {
-                self.before.values.extend(values);
-                self.before.errors = errors.or(self.before.errors.take());
-            }
-        }
-        self.before.errors.get_or_insert_default();
-        let origin = &self.rig().origin;
-        let left = sentences(&self.before.values, "nothing was put back", origin);
-        self.left.foretell(left, None);
+/// Reads what a scenario may change of the drives, where it has not been read: nothing of it is recorded. Where drives may be in the middle
+/// of something, their rings are recovered first if that `may_recover`.
+pub(super) fn remember(
+    session: &mut Session,
+    touched: &BTreeSet<(Axis, Touched)>,
+    may_recover: bool,
+) {
+    if session.rig().is_simulated() {
+        return;
     }
-
-    /// Puts back what scenarios have changed since drives were [read](Self::remember), where they were seen in their safe state. Returns what is
-    /// left to say.
-    pub(crate) fn put_back(&mut self, safe: bool) -> Vec<String> {
-        let Before {
-            values,
-            errors,
-            earlier,
-        } = std::mem::take(&mut self.before);
-        let mut all: Vec<_> = earlier.into_iter().collect();
-        if let Some(errors) = errors {
-            let notes = self.all_back(safe, values, &errors);
-            self.left.keep(&notes);
-            all.extend(notes);
-        }
-        all
+    let first = session.drives().before.errors.is_none();
+    if first {
+        let _of_others = session.link().take_touched();
     }
-
-    fn all_back(
-        &mut self,
-        safe: bool,
-        values: Values,
-        errors: &BTreeMap<Axis, u16>,
-    ) -> Vec<String> {
-        let origin = self.rig().origin.clone();
-        let touched = self.link().take_touched();
-        let unread: BTreeSet<_> = touched
-            .into_iter()
-            .flat_map(|(axis, touched)| places(touched).into_iter().map(move |own| (axis, own)))
-            .filter(|place| !values.contains_key(place))
-            .collect();
-        let mut by_drive: BTreeMap<Axis, String> = BTreeMap::new();
-        for (axis, place) in unread {
-            let name = place.assignment(0).map_or_else(
-                |_| " GPO1 or GPO2".to_owned(),
-                |own| format!(" {}", own.0.split('=').next().unwrap_or_default()),
-            );
-            by_drive.entry(axis).or_default().push_str(&name);
-        }
-        let unread = by_drive.into_iter().map(|(axis, names)| {
-            format!("drive {axis}: what was held before a scenario wrote it is not known, and not put back:{names}")
+    let all = touched
+        .iter()
+        .flat_map(|(axis, touched)| places(*touched).into_iter().map(|own| (*axis, own)));
+    let mut wanted: BTreeSet<_> = all.collect();
+    wanted.retain(|place| !session.drives().before.values.contains_key(place));
+    if !first && wanted.is_empty() {
+        return;
+    }
+    if !session.link().at_rest() && may_recover {
+        // What is wrong with the rings is said by the examination in front of the scenario.
+        let _examined = session.examined();
+    }
+    if session.link().at_rest() {
+        let (rings, axes) = (session.rings().to_vec(), session.axes());
+        let read = session.link().aside(|link| {
+            with_bus(link, &rings, |bus| {
+                let errors = first.then(|| errors(bus, &axes)).transpose()?;
+                Ok((read(bus, &wanted)?, errors))
+            })
         });
-        let mut notes: Vec<_> = unread.collect();
-        if !safe {
-            notes.extend(sentences(&values, "nothing was put back", &origin));
-        } else {
-            if !self.link().at_rest() {
-                let _examined = self.examined();
-            }
-            let rings = self.rings().to_vec();
-            let link = self.link();
-            let left = values_back(link, &rings, values);
-            for (why, left) in &left {
-                notes.extend(sentences(left, why, &origin));
-            }
-            if left.is_empty() {
-                notes.extend(errors_back(link, &rings, errors, &origin));
-            }
+        // What was not read is said at the end, if it was changed.
+        if let Ok((values, errors)) = read {
+            let before = &mut session.drives_mut().before;
+            before.values.extend(values);
+            before.errors = errors.or(before.errors.take());
         }
-        notes
     }
+    session.drives_mut().before.errors.get_or_insert_default();
+    let (values, origin) = (&session.drives().before.values, &session.rig().origin);
+    let left = sentences(values, "nothing was put back", origin);
+    session.left().foretell(left, None);
+}
+
+/// Puts back what scenarios have changed since drives were [read](remember), where they were seen in their safe state. Returns what is
+/// left to say.
+pub(crate) fn put_back(session: &mut Session, safe: bool) -> Vec<String> {
+    let Before {
+        values,
+        errors,
+        earlier,
+    } = std::mem::take(&mut session.drives_mut().before);
+    let mut all: Vec<_> = earlier.into_iter().collect();
+    if let Some(errors) = errors {
+        let notes = all_back(session, safe, values, &errors);
+        session.left().keep(&notes);
+        all.extend(notes);
+    }
+    all
+}
+
+fn all_back(
+    session: &mut Session,
+    safe: bool,
+    values: Values,
+    errors: &BTreeMap<Axis, u16>,
+) -> Vec<String> {
+    let origin = session.rig().origin.clone();
+    let touched = session.link().take_touched();
+    let unread: BTreeSet<_> = touched
+        .into_iter()
+        .flat_map(|(axis, touched)| places(touched).into_iter().map(move |own| (axis, own)))
+        .filter(|place| !values.contains_key(place))
+        .collect();
+    let mut by_drive: BTreeMap<Axis, String> = BTreeMap::new();
+    for (axis, place) in unread {
+        let name = place.assignment(0).map_or_else(
+            |_| " GPO1 or GPO2".to_owned(),
+            |own| format!(" {}", own.0.split('=').next().unwrap_or_default()),
+        );
+        by_drive.entry(axis).or_default().push_str(&name);
+    }
+    let unread = by_drive.into_iter().map(|(axis, names)| {
+        format!("drive {axis}: what was held before a scenario wrote it is not known, and not put back:{names}")
+    });
+    let mut notes: Vec<_> = unread.collect();
+    if !safe {
+        notes.extend(sentences(&values, "nothing was put back", &origin));
+    } else {
+        if !session.link().at_rest() {
+            let _examined = session.examined();
+        }
+        let rings = session.rings().to_vec();
+        let link = session.link();
+        let left = values_back(link, &rings, values);
+        for (why, left) in &left {
+            notes.extend(sentences(left, why, &origin));
+        }
+        if left.is_empty() {
+            notes.extend(errors_back(link, &rings, errors, &origin));
+        }
+    }
+    notes
 }
 
 /// Does something with the drives of open rings. What was sent before is let back first: it would be taken for bytes without a sender.

@@ -7,6 +7,7 @@ use super::judge::{AttemptFacts, judge, known};
 use super::open::line_rate;
 use super::reach::{heard, keeping_parity, reached};
 use super::run::{Way, not_played, opening, play_one, twin};
+use super::session::unhealthy;
 use super::walk::Walks;
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
@@ -21,7 +22,7 @@ use harness_bench::rig::playing::{
     RecordedBench, RepeatedVerdict,
 };
 use harness_bench::rig::rings::rings;
-use harness_bench::rig::{Attempt, Rig, SessionError};
+use harness_bench::rig::{Attempt, Rig};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::run::{DENIED, Outcome, Skip, Why};
 use harness_bench::scenario::source::Source;
@@ -234,15 +235,7 @@ impl RecordJudge for RingJudge {
         let exact = replay.is_exact();
         let mut outcome = match play_one(&mut replay, &plan, &way) {
             Ok(outcome) => outcome,
-            Err((ring, ill)) => {
-                let ill = SessionError::Ill {
-                    rig: rig.id().to_owned(),
-                    ring: ring + 1,
-                    ill: Box::new(ill),
-                    cause: None,
-                };
-                Outcome::rig_error(ill.to_string())
-            }
+            Err((ring, ill)) => Outcome::rig_error(unhealthy(rig, ring, ill).to_string()),
         };
         let simulated = rig.is_simulated();
         let all = Conversation::all(recorded.events, self.rate.byte_time(), simulated);

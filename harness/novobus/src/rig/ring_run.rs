@@ -1,7 +1,7 @@
 //! A ring in use, as the commands of all buses play scenarios on it.
 
 use super::run::{RigModel, Run};
-use super::session::Session;
+use super::session::{self, Session};
 use super::wrong_parity;
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
@@ -34,8 +34,8 @@ impl RingRun {
     /// [`SessionError`]; nothing is left locked or open.
     pub(crate) fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         let model = RigModel::of(rig).map_err(|why| SessionError::Mistakes(Box::new(why)))?;
-        let mut session = Session::open(rig, options)?;
-        let tries = options.tries_line_errors && session.opening().is_some();
+        let mut session = session::open(rig, options)?;
+        let tries = options.tries_line_errors && session.drives().opening.is_some();
         let obstacles = match tries {
             true => wrong_parity::obstacles(&mut session),
             false => Ok(Vec::new()),
@@ -131,7 +131,7 @@ impl RigRun for RingRun {
     }
 
     fn close(mut self: Box<Self>, error: bool) -> End {
-        self.run.session().end(error)
+        session::close(self.run.session(), error)
     }
 }
 

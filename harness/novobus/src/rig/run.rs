@@ -6,8 +6,8 @@ use super::driven::Driven;
 use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
 use super::held_session::HeldSession;
 use super::judge::{AttemptFacts, judge, known};
-use super::put_back::within;
-use super::session::Session;
+use super::put_back::{begin, remember, within};
+use super::session::{self, OfRings as _, Session};
 use super::sim;
 use crate::gate::{GuardsRings as _, guard_rings};
 use crate::language::plan::Plan;
@@ -91,7 +91,7 @@ impl<'s> Run<'s> {
     }
 
     fn on(mut session: HeldSession<'s>, RigModel { twin, master }: RigModel) -> Self {
-        session.begin();
+        begin(&mut session);
         let tolerance = session.link().time_tolerance();
         let simulated = session.rig().is_simulated();
         let abilities = session.link().capabilities();
@@ -211,7 +211,7 @@ impl<'s> Run<'s> {
         // What the scenario before has left may answer no interlock.
         let examined = way.examine(&mut Recording::new(self.session.link(), &mut both));
         if examined.is_ok() {
-            self.session.ask_interlocks();
+            self.session.look_at_interlocks();
         }
         let is_trouble = |event: &LinkEvent| matches!(event, LinkEvent::Trouble(_));
         let told = both.events.iter().any(is_trouble);
@@ -224,10 +224,10 @@ impl<'s> Run<'s> {
         let traces = (0..rings).map(|ring| recording.trace(ring)).collect();
         let mut outcome = match outcome {
             Ok(outcome) => outcome,
-            Err((ring, ill)) if self.session.ill_as_well() => {
-                Outcome::rig_error(self.session.ill(ring, ill).to_string())
+            Err((ring, ill)) if self.session.drives().ill_as_well => {
+                Outcome::rig_error(session::unhealthy(self.session.rig(), ring, ill).to_string())
             }
-            Err((ring, ill)) => return Err(self.session.ill(ring, ill)),
+            Err((ring, ill)) => return Err(session::unhealthy(self.session.rig(), ring, ill)),
         };
         let all = Conversation::all(&both.events, self.byte_time, simulated);
         if let (false, Some(last)) = (simulated, all.last()) {
@@ -378,7 +378,7 @@ impl<'s> Run<'s> {
             }
         }
         // Drives that are reset, or have just been opened, and the twin know of no recovery before.
-        self.session.remember(&touched, resets || !self.played);
+        remember(&mut self.session, &touched, resets || !self.played);
         self.played = true;
     }
 

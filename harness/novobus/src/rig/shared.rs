@@ -1,6 +1,6 @@
 //! A rig in use as a line that a driver can own, with the rig itself kept for its end.
 
-use crate::rig::Session;
+use crate::rig::session::{self, Session};
 use harness_bench::link::{Lead, Line, Trouble};
 use harness_bench::medium::{Heard, Medium, Out};
 use harness_bench::rig::End;
@@ -57,11 +57,8 @@ impl Shared {
 
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
     pub(crate) fn close(&self, error: bool) -> Option<End> {
-        let session = lock(&self.session).take()?;
-        Some(match error {
-            true => session.close_with_error(),
-            false => session.close(),
-        })
+        let mut session = lock(&self.session).take()?;
+        Some(session::close(&mut session, error))
     }
 
     /// Gives the rig back with its drives as they are.

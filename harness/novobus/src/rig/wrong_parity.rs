@@ -1,7 +1,7 @@
 //! Whether a byte with a wrong parity bit reaches the first drive of a ring. Some drivers of serial ports refuse to switch the parity, and some
 //! ignore it and say that they did it.
 
-use super::session::Session;
+use super::session::{OfRings as _, Session};
 use harness_bench::link::{
     Capability, Line as _, Link as _, LinkFault, Moment, Octets as _, PlacedFault, wait_keeping,
 };

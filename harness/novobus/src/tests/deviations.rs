@@ -9,7 +9,7 @@ use crate::language::plan::Plan;
 use crate::language::read::RingScenario;
 use crate::qualify::deviating_masters;
 use crate::rig::OnRings as _;
-use crate::rig::{Run, Session, parse};
+use crate::rig::{Run, parse, session};
 use crate::simulate::simulated;
 use crate::tests::{ROOT, built_in_sources};
 use harness_bench::link::{Capability, Line, Link};
@@ -265,7 +265,7 @@ fn every_wrong_master_is_named() {
             allow_motion: true,
             ..UseOptions::default()
         };
-        let mut session = Session::open(&rig, &options).expect("a rig in use");
+        let mut session = session::open(&rig, &options).expect("a rig in use");
         let plan = found_by(deviation.name, &by, &scenarios).plan.clone();
         let mut on_rig = Run::new(&mut session).expect("a twin");
         let played = on_rig.play(&plan, None).expect("a healthy rig");
@@ -283,7 +283,7 @@ fn every_wrong_master_is_named() {
         assert!(!driven.is_empty(), "{}", deviation.name);
         let named = deviating_masters(&driven);
         assert!(named.contains(&deviation), "{}: {named:?}", deviation.name);
-        let _end = session.close();
+        let _end = session.close(false);
     }
 }
 
@@ -298,13 +298,13 @@ fn on_a_rig(setup: &str, limits: &str, plans: &[Plan]) -> Vec<PlayedScenario> {
         allow_motion: !limits.is_empty(),
         ..UseOptions::default()
     };
-    let mut session = Session::open(&rig, &options).expect("a rig in use");
+    let mut session = session::open(&rig, &options).expect("a rig in use");
     let mut on_rig = Run::new(&mut session).expect("a twin");
     let played = plans
         .iter()
         .map(|plan| on_rig.play(plan, None).expect("a healthy rig"));
     let played = played.collect();
-    let _end = session.close();
+    let _end = session.close(false);
     played
 }
 

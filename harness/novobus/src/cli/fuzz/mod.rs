@@ -8,8 +8,9 @@ mod shrink;
 use super::give_back_session as give_back;
 use crate::explore::{Case, CaseScope, RingScope, RingSetup, Spice, page};
 use crate::language::run::over_bus::start_anew;
+use crate::rig::session;
 use crate::rig::wrong_parity;
-use crate::rig::{Run, Session};
+use crate::rig::{OfRings as _, Run, Session};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::fuzz::promote::keep;
 use harness_bench::command::fuzz::{FuzzCommands, verify_as};
@@ -44,7 +45,7 @@ pub(crate) fn on_ports(
         alarm: alarm(),
         ..options
     };
-    let mut session = match Session::open(rig, &options) {
+    let mut session = match session::open(rig, &options) {
         Ok(session) => session,
         Err(error) => {
             output.complain(&error.to_string());

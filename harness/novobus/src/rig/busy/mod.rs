@@ -4,7 +4,7 @@ pub(super) mod line;
 mod qualified;
 
 use super::run::Run;
-use super::session::Session;
+use super::session::{Session, at_port};
 use crate::guard::safe_state::{SafeConfirmation, safe_state};
 use crate::language::read::RingScenario;
 use crate::rig::parse;
@@ -57,7 +57,7 @@ pub(super) fn session(rig: &Rig, drives: &str, stalls: Stalls) -> Result<Session
         ill_as_well: true,
         ..UseOptions::default()
     };
-    Session::at_port(rig, &options, Box::new(line(drives, stalls)))
+    at_port(rig, &options, Box::new(line(drives, stalls)))
 }
 
 /// Plays the built-in scenarios with this in their name, and returns those that accuse a drive. A rig error accuses none.
@@ -154,7 +154,7 @@ fn nothing_is_awaited_for_a_pause() {
 fn the_longest_run_ends_at_an_examination() {
     let rig = rig("");
     let line = Box::new(line("", Stalls::new(1, 0)));
-    let mut session = Session::at_port(&rig, &UseOptions::default(), line).expect("a right ring");
+    let mut session = at_port(&rig, &UseOptions::default(), line).expect("a right ring");
     session.link().set_deadline(Some(std::time::Instant::now()));
     let mut run = Run::new(&mut session).expect("a run");
     let entry = entry("a.scn", "title t\nring 3\n> 80\n< 80\n".to_owned());

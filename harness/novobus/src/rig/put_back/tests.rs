@@ -55,14 +55,14 @@ fn what_a_scenario_changes_is_put_back() {
     let before = all(&mut session);
     assert_eq!(play(&mut session, CHANGES), Verdict::Passed);
     assert_ne!(all(&mut session), before);
-    let left = session.left.all().join("\n");
+    let left = session.left().all().join("\n");
     let write = "`drivebench write 2 ee:60=0x00 ";
     assert!(left.contains(write) && left.contains("FF71=0x21"), "{left}");
-    session.before.earlier = Some("left before".to_owned());
+    session.drives_mut().before.earlier = Some("left before".to_owned());
     let end = session.end(false);
     assert_eq!(end.remarks, ["left before"]);
     assert!(end.safe.is_some_and(|safe| safe.confirmed));
-    assert_eq!(session.left.all(), [""; 0]);
+    assert_eq!(session.left().all(), [""; 0]);
     let (rings, axes) = (session.rings().to_vec(), session.axes());
     let errors = with_bus(session.link(), &rings, |bus| latched(bus, &axes));
     assert_eq!(
@@ -88,7 +88,7 @@ fn a_lost_byte_leaves_nothing_changed() {
             .link()
             .inner_mut()
             .inject(0, lost, Moment::Byte(byte));
-        assert_eq!(session.put_back(true), [""; 0], "byte {byte}");
+        assert_eq!(put_back(&mut session, true), [""; 0], "byte {byte}");
         assert_eq!(session.link().unused_faults(), [""; 0], "byte {byte}");
         assert_eq!(all(&mut session), before, "byte {byte}");
     }
@@ -111,7 +111,7 @@ fn bytes_on_their_way_disturb_nothing() {
         Ok(bus.corrected_errors())
     });
     assert_eq!(disturbed, Ok(0));
-    assert_eq!(session.put_back(true), [""; 0]);
+    assert_eq!(put_back(&mut session, true), [""; 0]);
     assert_eq!(all(&mut session), before);
 }
 
