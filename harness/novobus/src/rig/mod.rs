@@ -10,7 +10,6 @@ mod driven;
 pub(crate) mod explanation;
 pub(crate) mod figures;
 pub(crate) mod health;
-mod held_session;
 pub(crate) mod interlock;
 pub(crate) mod judge;
 pub(crate) mod line_test;

@@ -4,7 +4,6 @@
 use super::beside::{BesideTwin, is_late_elsewhere};
 use super::driven::Driven;
 use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
-use super::held_session::HeldSession;
 use super::judge::{AttemptFacts, judge, known};
 use super::put_back::{begin, remember, within};
 use super::session::{self, OfRings as _, Session};
@@ -34,12 +33,14 @@ use harness_proto::novobus::guard::{Limits, Touched};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
 use std::collections::BTreeSet;
+use std::ops::DerefMut;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A rig that scenarios are played on, and its twin.
 pub(crate) struct Run<'s> {
-    session: HeldSession<'s>,
+    /// A rig in use, for as long as it is or for a while.
+    session: Box<dyn DerefMut<Target = Session> + 's>,
     twin: Twin,
     exactness: Exactness,
     byte_time: Span,
@@ -82,15 +83,18 @@ impl<'s> Run<'s> {
     /// Known deviations of the rig's file that make no ring.
     pub(crate) fn new(session: &'s mut Session) -> Result<Self, Problems> {
         let model = RigModel::of(session.rig())?;
-        Ok(Self::on(HeldSession::Lent(session), model))
+        Ok(Self::on(Box::new(session), model))
     }
 
     /// The same, for as long as the rig is in use.
     pub(super) fn of(session: Session, model: RigModel) -> Run<'static> {
-        Run::on(HeldSession::Own(Box::new(session)), model)
+        Run::on(Box::new(Box::new(session)), model)
     }
 
-    fn on(mut session: HeldSession<'s>, RigModel { twin, master }: RigModel) -> Self {
+    fn on(
+        mut session: Box<dyn DerefMut<Target = Session> + 's>,
+        RigModel { twin, master }: RigModel,
+    ) -> Self {
         begin(&mut session);
         let tolerance = session.link().time_tolerance();
         let simulated = session.rig().is_simulated();

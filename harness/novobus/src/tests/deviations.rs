@@ -283,6 +283,7 @@ fn every_wrong_master_is_named() {
         assert!(!driven.is_empty(), "{}", deviation.name);
         let named = deviating_masters(&driven);
         assert!(named.contains(&deviation), "{}: {named:?}", deviation.name);
+        drop(on_rig);
         let _end = session.close(false);
     }
 }
@@ -304,6 +305,7 @@ fn on_a_rig(setup: &str, limits: &str, plans: &[Plan]) -> Vec<PlayedScenario> {
         .iter()
         .map(|plan| on_rig.play(plan, None).expect("a healthy rig"));
     let played = played.collect();
+    drop(on_rig);
     let _end = session.close(false);
     played
 }

@@ -157,6 +157,7 @@ fn what_a_scenario_changes_behind_an_error_is_put_back() {
         let entry = entry("t.scn", format!("title t\nring 3\n{text}"));
         run.play(&entry.plan, None).expect("a healthy ring");
     }
+    drop(run);
     assert_eq!(session.end(false).remarks, [""; 0]);
     assert_eq!(all(&mut session), before);
 }
