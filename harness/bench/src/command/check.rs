@@ -4,7 +4,8 @@ use super::drives::CommandDrives;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::output::Output;
-use super::rig_failure::{exit_of, exit_of_end, tell_end};
+use super::rig_commands::unusable;
+use super::rig_failure::{exit_of_end, tell_end};
 use crate::link::Line as _;
 use crate::port::UNPROVEN_RATE;
 use crate::rig::session::RigSession;
@@ -32,8 +33,7 @@ pub(super) fn check<D: CommandDrives>(
     for_tools: bool,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let session = RigSession::<D>::open(rig, options);
-    let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
+    let mut session = RigSession::<D>::open(rig, options).map_err(unusable)?;
     let (mut text, mut objects) = (String::new(), Vec::new());
     let mut exit = Exit::Passed;
     for CheckedDrive { name, answer } in D::check(&mut session) {
@@ -50,7 +50,7 @@ pub(super) fn check<D: CommandDrives>(
         };
         text.push_str(&format!("{name}: {about}\n"));
     }
-    let ports = session.link().inner_mut().ports_mut();
+    let ports = session.ports();
     if ports.is_some_and(|ports| ports.has_unproven_rate(0)) {
         text.push_str(&format!("{UNPROVEN_RATE}\n"));
     }

@@ -6,6 +6,7 @@ use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::PortBench;
+use crate::command::rig_commands::unusable;
 use crate::guard::{Guarded, Safe};
 use crate::link::{Line, Link, Trouble};
 use crate::medium::Medium;
@@ -218,12 +219,7 @@ impl<D: CommandDrives> HeldBench for HeldPort<D> {
         let played = self.0.play(source, None);
         // The scenario's master asked them, and they are in their safe state.
         self.session().drives().forget();
-        let played = played.map_err(|error| {
-            Failure::Said(
-                crate::command::rig_failure::exit_of(&error),
-                error.to_string(),
-            )
-        })?;
+        let played = played.map_err(unusable)?;
         // A scenario that was cancelled is cleared up when the link is of use again.
         let cancelled = self.trouble() == Some(Trouble::Interrupted);
         match self.0.over().filter(|_| !cancelled) {
@@ -271,7 +267,7 @@ impl<D: CommandDrives> HeldBench for HeldPort<D> {
 
     fn resume(&mut self) -> Result<(), Failure> {
         let session = self.session();
-        if let Some(ports) = session.link().inner_mut().ports_mut() {
+        if let Some(ports) = session.ports() {
             ports.resume();
         }
         session.link().reset_after_denial();

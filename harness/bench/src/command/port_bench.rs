@@ -4,15 +4,15 @@ use super::exit::Exit;
 use super::failure::Failure;
 use super::held::HeldDrives;
 use super::output::Output;
-use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
+use super::rig_commands::unusable;
+use super::rig_failure::{exit_of_end, tell_end, use_options};
 use crate::command::axes::Axes;
 use crate::command::drive::RigArguments;
 use crate::command::rig_name::Use;
 use crate::link::Line as _;
+use crate::rig::Rig;
 use crate::rig::session::{RigDrives, RigSession};
-use crate::rig::{Rig, UseOptions};
 use crate::scenario::source::Source;
-use crate::signals::interrupt_flag;
 use std::time::Duration;
 
 /// Where a command runs.
@@ -56,19 +56,29 @@ pub fn on<D: RigDrives>(
             sim.setup = vec![source.text.to_string()];
         }
     }
-    let options = UseOptions {
-        purpose: as_what.purpose.to_owned(),
-        wait: Duration::from_nanos(arguments.patience.as_nanos()),
-        allow_motion: as_what.moves,
-        interrupt: interrupt_flag(),
-        alarm: alarm(),
-        ..UseOptions::default()
-    };
-    let session = RigSession::open(&rig, &options);
-    let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
+    let wait = Duration::from_nanos(arguments.patience.as_nanos());
+    let options = use_options(as_what.purpose, as_what.moves, Some(wait));
+    let mut session = RigSession::open(&rig, &options).map_err(unusable)?;
     session.look_at_interlocks();
     let result = act(&mut session, output);
     Ok(give_back(session, as_what, result, output))
+}
+
+/// The exit code of a command, and whether the drives stay as they are: always if nothing was done, else as it is said for success and for
+/// failure.
+pub fn outcome(
+    result: Result<Exit, Failure>,
+    [success, failure]: [bool; 2],
+    output: &mut Output,
+) -> (Exit, bool) {
+    match result {
+        Ok(exit) => (exit, success),
+        // Impossible requests and missing permissions are refused before anything is done.
+        Err(refused @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
+            (refused.tell(output), true)
+        }
+        Err(failed) => (failed.tell(output), failure),
+    }
 }
 
 fn give_back<D: RigDrives>(
@@ -77,14 +87,7 @@ fn give_back<D: RigDrives>(
     result: Result<Exit, Failure>,
     output: &mut Output,
 ) -> Exit {
-    let (exit, leave) = match result {
-        Ok(exit) => (exit, as_what.holds),
-        // Impossible requests and missing permissions are refused before anything is done.
-        Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
-            (failure.tell(output), true)
-        }
-        Err(failure) => (failure.tell(output), as_what.looks_only()),
-    };
+    let (exit, leave) = outcome(result, [as_what.holds, as_what.looks_only()], output);
     let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = match leave {
         true => session.release(),

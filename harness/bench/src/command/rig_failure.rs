@@ -6,7 +6,8 @@ use crate::link::Trouble;
 use crate::rig::buses::RigBuses;
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
-use crate::rig::{Alarm, End, FindError, Rig, SessionError, find};
+use crate::rig::{Alarm, End, FindError, Rig, SessionError, UseOptions, find};
+use crate::signals::interrupt_flag;
 use crate::top::screen;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -41,6 +42,18 @@ pub fn alarm() -> Alarm {
         }
         std::process::exit(i32::from(Exit::NotSafe as u8));
     })
+}
+
+/// How a command uses a rig, with the program's own interrupt and alarm.
+pub fn use_options(purpose: &str, allow_motion: bool, wait: Option<Duration>) -> UseOptions {
+    UseOptions {
+        purpose: purpose.to_owned(),
+        wait: wait.unwrap_or_default(),
+        allow_motion,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+        ..UseOptions::default()
+    }
 }
 
 /// Reports why a rig cannot be used, and gives the exit code for it.

@@ -15,17 +15,16 @@ use harness_bench::command::drive::RigArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
-use harness_bench::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
+use harness_bench::command::port_bench::outcome;
+use harness_bench::command::rig_commands::unusable;
+use harness_bench::command::rig_failure::{exit_of_end, find_any_rig, tell_end, use_options};
 use harness_bench::command::rig_name::{RigName, Use};
 use harness_bench::counted::counted;
 use harness_bench::link::{Line, Link};
 use harness_bench::medium::{Heard, Medium, Out};
-use harness_bench::rig;
-use harness_bench::rig::End;
-use harness_bench::rig::Rig;
 use harness_bench::rig::buses::RigBuses;
+use harness_bench::rig::{Rig, UseOptions};
 use harness_bench::scenario::source::Source;
-use harness_bench::signals::interrupt_flag;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::error::BusError;
@@ -265,17 +264,13 @@ pub(crate) fn take(
     as_what: Use,
     ill_as_well: bool,
 ) -> Result<Session, Failure> {
-    let options = rig::UseOptions {
-        purpose: as_what.purpose.to_owned(),
-        wait: Duration::from_nanos(arguments.patience.as_nanos()),
-        allow_motion: as_what.moves,
+    let wait = Duration::from_nanos(arguments.patience.as_nanos());
+    let options = UseOptions {
         ill_as_well,
         keeps_lines: true,
-        tries_line_errors: false,
-        interrupt: interrupt_flag(),
-        alarm: alarm(),
+        ..use_options(as_what.purpose, as_what.moves, Some(wait))
     };
-    session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
+    session::open(rig, &options).map_err(unusable)
 }
 
 /// The rig that has been found for a command.
@@ -316,14 +311,7 @@ fn give_back(
     let trouble = rig
         .with(|session| session.link().trouble().cloned())
         .flatten();
-    let (exit, leave) = match result {
-        Ok(exit) => (exit, as_what.holds),
-        // Impossible requests and missing permissions are refused before anything is done.
-        Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
-            (failure.tell(output), true)
-        }
-        Err(failure) => (failure.tell(output), false),
-    };
+    let (exit, leave) = outcome(result, [as_what.holds, false], output);
     let exit = exit_of_end(trouble.as_ref(), exit, output);
     let end = if leave {
         rig.release()
@@ -334,18 +322,13 @@ fn give_back(
 }
 
 /// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
-pub(crate) fn give_back_session(
-    mut session: Session,
-    exit: Exit,
-    output: &mut Output,
-) -> (End, Exit) {
+pub(crate) fn give_back_session(mut session: Session, exit: Exit, output: &mut Output) -> Exit {
     let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = session::close(
         &mut session,
         matches!(exit, Exit::RigError | Exit::Interlock),
     );
-    let exit = tell_end(&end, exit, output);
-    (end, exit)
+    tell_end(&end, exit, output)
 }
 
 /// Simulated drives, with nothing sent to them, on rings of these sizes where they are given.

@@ -7,7 +7,7 @@ use crate::command::exit::Exit;
 use crate::command::fuzz::promote::keep;
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::output::Output;
-use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
+use crate::command::rig_failure::{exit_of, exit_of_end, find_any_rig, tell_end, use_options};
 use crate::counted::counted;
 use crate::explore::line::{
     LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
@@ -19,9 +19,7 @@ use crate::explore::{
 use crate::link::Line as _;
 use crate::rig::buses::RigBuses;
 use crate::rig::{Rig, UseOptions};
-use crate::signals::interrupt_flag;
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 /// How often a finding is tried before it is made small on a rig.
 const TRIES: u8 = 3;
@@ -100,8 +98,8 @@ fn run<B: LineRig>(
             sim.setup
                 .extend(planted.iter().map(PlantedDrive::line::<B>));
         }
-        let how = ("fuzz", arguments.allow_motion, arguments.wait);
-        return on_adapter::<B>(&rig, how, output, |target, (scope, setup), output| {
+        let how = use_options("fuzz", arguments.allow_motion, arguments.wait);
+        return on_adapter::<B>(&rig, &how, output, |target, (scope, setup), output| {
             target.end_between_cases();
             output.say(&left_out::<B>(&rig, arguments.allow_motion));
             let about = settings((&name, true), (&scope, setup), run);
@@ -159,7 +157,7 @@ fn simulated<B: LineRig>(rig: &Rig) -> LineScope<B> {
 /// Works on the drives of a rig behind an adapter, and gives the rig back in its safe state.
 fn on_adapter<B: LineRig>(
     rig: &Rig,
-    (purpose, allow_motion, wait): (&str, bool, Option<Duration>),
+    options: &UseOptions,
     output: &mut Output,
     work: impl FnOnce(
         &mut OnAdapter<'_, B>,
@@ -167,15 +165,7 @@ fn on_adapter<B: LineRig>(
         &mut Output,
     ) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
-    let options = UseOptions {
-        purpose: purpose.to_owned(),
-        wait: wait.unwrap_or_default(),
-        allow_motion,
-        interrupt: interrupt_flag(),
-        alarm: alarm(),
-        ..UseOptions::default()
-    };
-    let mut session = match SessionOf::<B>::open(rig, &options) {
+    let mut session = match SessionOf::<B>::open(rig, options) {
         Ok(session) => session,
         Err(error) => {
             output.complain(&error.to_string());
@@ -186,7 +176,7 @@ fn on_adapter<B: LineRig>(
     let scope = LineScope::<B> {
         drives: B::stations(rig, Some(&session)),
         spices: all
-            .filter(|own| B::lacks(rig, allow_motion, *own).is_none())
+            .filter(|own| B::lacks(rig, options.allow_motion, *own).is_none())
             .collect(),
     };
     let mut setup = LineSetup::of_rig::<B>(rig, &scope.drives, Vec::new());
@@ -287,8 +277,8 @@ fn shrink<B: LineRig>(
                 return Ok(Exit::Usage);
             }
             let most = arguments.runs.unwrap_or(RUNS_ON_RIG);
-            let how = ("shrink", arguments.allow_motion, arguments.wait);
-            on_adapter::<B>(&rig, how, output, |target, _, output| {
+            let how = use_options("shrink", arguments.allow_motion, arguments.wait);
+            on_adapter::<B>(&rig, &how, output, |target, _, output| {
                 match is_shown(&finding, target) {
                     Ok(true) => told(smaller(&finding, target, most), output),
                     Ok(false) => {
@@ -343,8 +333,8 @@ fn replay<B: LineRig>(
         FuzzRun::new(about, scope)
     };
     if !rig.is_simulated() {
-        let how = ("fuzz replay", arguments.allow_motion, arguments.wait);
-        return on_adapter::<B>(rig, how, output, |target, scope, output| {
+        let how = use_options("fuzz replay", arguments.allow_motion, arguments.wait);
+        return on_adapter::<B>(rig, &how, output, |target, scope, output| {
             play(arguments, begin(true, scope), cases, target, output)
         });
     }

@@ -15,11 +15,10 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::fuzz::promote::keep;
 use harness_bench::command::fuzz::{FuzzCommands, verify_as};
 use harness_bench::command::output::Output;
-use harness_bench::command::rig_failure::{alarm, exit_of};
+use harness_bench::command::rig_failure::exit_of;
 use harness_bench::link::Line as _;
 use harness_bench::link::{Capability, Link, Trouble};
 use harness_bench::rig::{Rig, UseOptions};
-use harness_bench::signals::interrupt_flag;
 use harness_proto::novobus::guard::Limits;
 
 /// How rings are explored.
@@ -36,16 +35,11 @@ pub(crate) const COMMANDS: FuzzCommands = FuzzCommands {
 /// Opens a rig with ports, works on it, and gives it back in its safe state.
 pub(crate) fn on_ports(
     rig: &Rig,
-    options: UseOptions,
+    options: &UseOptions,
     output: &mut Output,
     work: impl FnOnce(&mut Run<'_>, &mut Output) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
-    let options = UseOptions {
-        interrupt: interrupt_flag(),
-        alarm: alarm(),
-        ..options
-    };
-    let mut session = match session::open(rig, &options) {
+    let mut session = match session::open(rig, options) {
         Ok(session) => session,
         Err(error) => {
             output.complain(&error.to_string());
@@ -57,7 +51,7 @@ pub(crate) fn on_ports(
         Err(error) => {
             output.complain(&error.to_string());
             let exit = exit_of(&error);
-            return Ok(give_back(session, exit, output).1);
+            return Ok(give_back(session, exit, output));
         }
     }
     let worked = match Run::new(&mut session) {
@@ -70,7 +64,7 @@ pub(crate) fn on_ports(
     leave_clean(&mut session, output);
     session.end_if_overdue();
     let exit = worked.unwrap_or_else(|error| output.unwritable(&error));
-    Ok(give_back(session, exit, output).1)
+    Ok(give_back(session, exit, output))
 }
 
 /// What cases have left in the drives' RAM goes with a reset, where that is allowed.

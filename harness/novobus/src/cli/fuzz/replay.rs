@@ -8,9 +8,10 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
 use harness_bench::command::fuzz::tell;
 use harness_bench::command::output::Output;
+use harness_bench::command::rig_failure::use_options;
 use harness_bench::explore::{ExploreError, RECORD};
 use harness_bench::regular::{self, Links};
-use harness_bench::rig::{Rig, UseOptions};
+use harness_bench::rig::Rig;
 use harness_proto::novobus::guard::Limits;
 use std::path::Path;
 
@@ -46,13 +47,8 @@ pub(super) fn replay(
         let campaign = campaign(arguments, rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);
     }
-    let options = UseOptions {
-        purpose: "fuzz replay".to_owned(),
-        allow_motion: arguments.allow_motion,
-        wait: arguments.wait.unwrap_or_default(),
-        ..UseOptions::default()
-    };
-    on_ports(rig, options, output, |run, output| {
+    let options = use_options("fuzz replay", arguments.allow_motion, arguments.wait);
+    on_ports(rig, &options, output, |run, output| {
         let scope = scope(run);
         let limits = scope.limits;
         let campaign = campaign(

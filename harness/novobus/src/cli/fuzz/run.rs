@@ -11,8 +11,9 @@ use harness_bench::command::fuzz::run::{
 };
 use harness_bench::command::fuzz::tell;
 use harness_bench::command::output::Output;
+use harness_bench::command::rig_failure::use_options;
 use harness_bench::explore::{Planted, Spiced as _, read_as};
-use harness_bench::rig::{Rig, UseOptions};
+use harness_bench::rig::Rig;
 use harness_proto::novobus::guard::Limits;
 
 /// Explores the rings of a rig.
@@ -50,13 +51,8 @@ pub(super) fn run(
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);
     }
-    let options = UseOptions {
-        purpose: "fuzz".to_owned(),
-        allow_motion: arguments.allow_motion,
-        wait: arguments.wait.unwrap_or_default(),
-        ..UseOptions::default()
-    };
-    on_ports(&rig, options, output, |run, output| {
+    let options = use_options("fuzz", arguments.allow_motion, arguments.wait);
+    on_ports(&rig, &options, output, |run, output| {
         let scope = scope(run);
         let mut target = match OnRig::new(run, scope.limits) {
             Ok(target) => target,

@@ -9,10 +9,10 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use harness_bench::command::fuzz::tell;
 use harness_bench::command::output::Output;
+use harness_bench::command::rig_failure::use_options;
 use harness_bench::counted::counted;
 use harness_bench::explore::Planted;
 use harness_bench::explore::{ExploreError, Target};
-use harness_bench::rig::UseOptions;
 use harness_bench::rig::buses::RigBuses;
 use harness_sim::novobus::deviation::DEVIATIONS;
 use std::path::Path;
@@ -57,15 +57,10 @@ pub(super) fn shrink(
         ));
         return Ok(Exit::Usage);
     }
-    let options = UseOptions {
-        purpose: "shrink".to_owned(),
-        allow_motion: arguments.allow_motion,
-        wait: arguments.wait.unwrap_or_default(),
-        ..UseOptions::default()
-    };
+    let options = use_options("shrink", arguments.allow_motion, arguments.wait);
     let most = arguments.runs.unwrap_or(RUNS_ON_RIG);
     let start = explained(&finding, output);
-    on_ports(&rig, options, output, |run, output| {
+    on_ports(&rig, &options, output, |run, output| {
         let small = on_rig(&finding, start, most, run);
         settle(&finding, &path, small, output)
     })
