@@ -76,7 +76,6 @@ pub fn exit_of(error: &SessionError) -> Exit {
         | SessionError::Drives { .. }
         | SessionError::Quarantine { .. }
         | SessionError::State(_)
-        | SessionError::Open { .. }
         | SessionError::Hook { .. }
         | SessionError::Watchdog(_)
         | SessionError::Ill { .. } => Exit::RigError,

@@ -21,7 +21,7 @@ pub enum SessionError {
         /// Their bus.
         bus: &'static str,
     },
-    /// Its drives do not answer, or its bus is in use.
+    /// A port cannot be opened, its drives do not answer, or its bus is in use.
     #[error("rig {rig}: {why}")]
     Drives {
         rig: String,
@@ -57,13 +57,6 @@ pub enum SessionError {
     /// The watchdog cannot be started.
     #[error("failed to start the watchdog: {0}")]
     Watchdog(std::io::Error),
-    /// A port.
-    #[error("rig {rig}: {error}")]
-    Open {
-        rig: String,
-        /// Why not.
-        error: Finding,
-    },
     #[error("rig {rig}: {error}")]
     Hook { rig: String, error: Box<HookError> },
     /// The program was interrupted while it opened the rig.

@@ -5,80 +5,18 @@ use crate::simulate::warm;
 use crate::stream::StreamLink;
 use harness_bench::link::{InnerLink, InnerPorts};
 use harness_bench::medium::ErrorMarks;
-use harness_bench::port::{self, OpenError, PortSettings, Wire};
+use harness_bench::port::{self, PortSettings, Wire};
 use harness_bench::rig::ends::Ends;
 use harness_bench::rig::file::{Endpoint, Transport};
-use harness_bench::rig::lock::{PortLock, PortLockError};
-use harness_bench::rig::scan::{self, FoundPort, MatchError};
+use harness_bench::rig::lock::PortLock;
+use harness_bench::rig::scan::{self, FoundPort};
+use harness_bench::rig::session::{failed, lock, unopened};
 use harness_bench::rig::{Rig, SessionError};
-use harness_bench::scenario::problem::Problems;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// Why a rig's ports cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum OpenRigError {
-    #[error(transparent)]
-    Port(#[from] OpenError),
-    /// No port, or several, fit what the file says of one.
-    #[error(transparent)]
-    Match(#[from] MatchError),
-    /// Another program uses a port.
-    #[error("{port}: {error}")]
-    Lock {
-        port: String,
-        /// Why not.
-        error: PortLockError,
-    },
-    /// The lines of `[sim]`.
-    #[error(transparent)]
-    Setup(#[from] Problems),
-    /// Several transports that have no line in common.
-    #[error(
-        "ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a rig must have the same rate"
-    )]
-    Rates {
-        /// Ring 1.
-        first: u32,
-        /// Ring 2.
-        second: u32,
-    },
-}
-
-impl OpenRigError {
-    /// The same as an error of the rig's.
-    pub(crate) fn of_rig(self, rig: &Rig) -> SessionError {
-        let busy = matches!(
-            self,
-            Self::Port(OpenError::InUse { .. })
-                | Self::Lock {
-                    error: PortLockError::Busy { .. },
-                    ..
-                }
-        );
-        let name = rig.id().to_owned();
-        match busy {
-            true => SessionError::PortInUse {
-                rig: name,
-                why: self.to_string(),
-            },
-            false => SessionError::Open {
-                rig: name,
-                error: Box::new(self),
-            },
-        }
-    }
-}
-
-/// Open ends, and the locks of their ports.
-#[derive(Debug)]
-pub(crate) struct Opened {
-    pub(crate) ends: Ends,
-    pub(crate) locks: Vec<PortLock>,
-}
 
 /// The rate of a rig's line.
 pub(crate) fn line_rate(rig: &Rig) -> Rate {
@@ -92,13 +30,15 @@ pub(crate) fn stated_rate(rig: &Rig) -> Rate {
     first.map_or_else(Rate::default, |ring| ring.endpoint.line.into())
 }
 
-/// Opens a rig's ends; nothing is sent.
-pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
+/// Opens a rig's ends, and locks its ports; nothing is sent.
+pub(crate) fn open(
+    rig: &Rig,
+    interrupt: Arc<AtomicBool>,
+) -> Result<(Ends, Vec<PortLock>), SessionError> {
     if rig.is_simulated() {
-        return Ok(Opened {
-            ends: Ends::Simulated(Box::new(warm(&rig.plan()?))),
-            locks: Vec::new(),
-        });
+        let plan = rig.plan();
+        let plan = plan.map_err(|problems| failed(rig, &problems.to_string()))?;
+        return Ok((Ends::Simulated(Box::new(warm(&plan))), Vec::new()));
     }
     let ports = scan::scan(Path::new("/"));
     let mut locks = Vec::new();
@@ -107,16 +47,18 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     for (_, ring) in rig.rings() {
         let own = Rate::from(ring.endpoint.line);
         if own != rate {
-            return Err(OpenRigError::Rates {
-                first: rate.bits_per_second(),
-                second: own.bits_per_second(),
-            });
+            let why = format!(
+                "ring 2 runs at {} bit/s, ring 1 at {}: both rings of a rig must have the same rate",
+                own.bits_per_second(),
+                rate.bits_per_second()
+            );
+            return Err(failed(rig, &why));
         }
-        wires.push((wire(&ring.endpoint, &ports, &mut locks)?, ring.drives));
+        wires.push((wire(rig, &ring.endpoint, &ports, &mut locks)?, ring.drives));
     }
     let mut inner = Vec::new();
     for tap in &rig.file.tap {
-        let wire = wire(&tap.endpoint, &ports, &mut locks)?;
+        let wire = wire(rig, &tap.endpoint, &ports, &mut locks)?;
         inner.push(inner_link(
             rig,
             tap.ring,
@@ -125,11 +67,11 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
         ));
     }
     for interposer in &rig.file.interposer {
-        let up = wire(&interposer.upstream, &ports, &mut locks)?;
+        let up = wire(rig, &interposer.upstream, &ports, &mut locks)?;
         let interposer_ports = if interposer.upstream == interposer.downstream {
             InnerPorts::Interposer(up)
         } else {
-            let down = wire(&interposer.downstream, &ports, &mut locks)?;
+            let down = wire(rig, &interposer.downstream, &ports, &mut locks)?;
             InnerPorts::TwoPortInterposer(up, down)
         };
         let from = interposer.link.from;
@@ -140,10 +82,7 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     let tolerance = Span::from_nanos(tolerance);
     let mut link = StreamLink::new(wires, inner, rate, interrupt);
     link.set_time_tolerance(tolerance);
-    Ok(Opened {
-        ends: Ends::Ports(Box::new(link)),
-        locks,
-    })
+    Ok((Ends::Ports(Box::new(link)), locks))
 }
 
 fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: InnerPorts) -> InnerLink {
@@ -154,14 +93,16 @@ fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: InnerPorts) -> Inner
 }
 
 fn wire(
+    rig: &Rig,
     endpoint: &Endpoint,
     ports: &[FoundPort],
     locks: &mut Vec<PortLock>,
-) -> Result<Wire, OpenRigError> {
+) -> Result<Wire, SessionError> {
     let named = endpoint.port.clone().unwrap_or_default();
     let place = match endpoint.transport {
         Transport::Serial if endpoint.port.is_none() => {
-            port::PortAddress::Serial(scan::resolve(ports, &endpoint.udev)?)
+            let found = scan::resolve(ports, &endpoint.udev);
+            port::PortAddress::Serial(found.map_err(|error| failed(rig, &error.to_string()))?)
         }
         Transport::Serial => port::PortAddress::Serial(named.into()),
         Transport::Pty => port::PortAddress::Pty(named.into()),
@@ -175,10 +116,10 @@ fn wire(
         format: Rate::from(endpoint.line).into(),
         marks: endpoint.marks == ErrorMarks::InBand,
         low_latency: endpoint.low_latency,
-    })?;
+    })
+    .map_err(|error| unopened(rig, &error))?;
     if matches!(endpoint.transport, Transport::Serial | Transport::Pty) {
-        let lock = PortLock::acquire(wire.fd());
-        locks.push(lock.map_err(|error| OpenRigError::Lock { port: name, error })?);
+        locks.push(lock(rig, &name, wire.fd())?);
     }
     Ok(wire)
 }

@@ -4,7 +4,7 @@ use super::cause::{self, LikelyCause};
 use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
-use super::open::{Opened, open as open_ends, stated_rate};
+use super::open::{open as open_ends, stated_rate};
 use super::put_back::{Before, put_back};
 use super::{limits, sim};
 use crate::driver::{Axis, count_behind};
@@ -17,6 +17,7 @@ use crate::simulate::warm;
 use harness_bench::guard::{Guarded, Safe, Standstill, Watch};
 use harness_bench::link::{Line, Link, Octets, Trouble};
 use harness_bench::medium::{ErrorMarks, Pieces};
+use harness_bench::rig::lock::PortLock;
 use harness_bench::rig::session::{OpenDrives, RigDrives, RigSession};
 use harness_bench::rig::{End, Ends, Rig, SessionError, UseOptions, standing, state};
 use harness_proto::line::Received;
@@ -57,8 +58,7 @@ pub(crate) type Session = RigSession<RingDrives>;
 
 impl RigDrives for RingDrives {
     fn open(rig: &Rig, options: &UseOptions) -> Result<OpenDrives<Self>, SessionError> {
-        let opened =
-            open_ends(rig, options.interrupt.clone()).map_err(|error| error.of_rig(rig))?;
+        let opened = open_ends(rig, options.interrupt.clone())?;
         Ok(guarded(rig, options, opened))
     }
 
@@ -165,7 +165,11 @@ impl OfRings for Session {
 }
 
 /// The drives of open ends, behind the gates of their rings.
-fn guarded(rig: &Rig, options: &UseOptions, opened: Opened) -> OpenDrives<RingDrives> {
+fn guarded(
+    rig: &Rig,
+    options: &UseOptions,
+    (ends, locks): (Ends, Vec<PortLock>),
+) -> OpenDrives<RingDrives> {
     let sizes = rig.sizes().into_iter();
     let limits = limits(rig, options.allow_motion);
     let drives = RingDrives {
@@ -178,7 +182,7 @@ fn guarded(rig: &Rig, options: &UseOptions, opened: Opened) -> OpenDrives<RingDr
         damages_ff: false,
         before: Before::default(),
     };
-    (drives, guard_rings(opened.ends, limits), opened.locks)
+    (drives, guard_rings(ends, limits), locks)
 }
 
 /// A rig without a lock behind an open port.
@@ -188,10 +192,7 @@ pub(crate) fn at_port(
     options: &UseOptions,
     port: Box<dyn harness_bench::link::PortLink>,
 ) -> Result<Session, SessionError> {
-    let opened = Opened {
-        ends: Ends::Ports(port),
-        locks: Vec::new(),
-    };
+    let opened = (Ends::Ports(port), Vec::new());
     let mut session = Session::over_open(rig, options, guarded(rig, options, opened))?;
     session.look_at_interlocks();
     session.link().begin();
