@@ -2,11 +2,16 @@
 
 use super::driven::Driven;
 use super::explanation::Explanation;
+use super::judge::{AttemptFacts, judge, known};
+use super::run::{opening, twin};
 use crate::language::syntax::Header;
-use crate::twin::{Comparison, Conversation, Divergence};
+use crate::twin::{Comparison, Conversation, Divergence, Twin};
+use harness_bench::link::{Capability, LinkEvent};
 use harness_bench::rig::{Attempt, PlayedScenario};
+use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use std::sync::Arc;
 
 /// What an attempt on rings has beside its outcome.
 #[derive(Clone, Debug)]
@@ -40,6 +45,53 @@ impl BesideTwin {
                 ..self
             },
         }
+    }
+}
+
+/// Judges an attempt beside a twin, which is replaced where it has heard something else than the drives. `facts` has nothing of what was said.
+pub(super) fn judged(
+    facts: AttemptFacts<'_>,
+    said: Vec<Conversation>,
+    (events, capabilities): (&[LinkEvent], &[Capability]),
+    mut outcome: Outcome,
+    beside: &mut Twin,
+) -> Attempt {
+    let (rig, way, exactness) = (facts.rig, facts.way, facts.exactness);
+    // It was made before.
+    let fresh = || twin(rig, &known(rig)).ok();
+    let opening = opening(rig, way, &said, exactness);
+    let (conversations, anew) = way.compared(said, exactness);
+    if anew && let Some(fresh) = fresh() {
+        *beside = fresh;
+    }
+    let (comparisons, stale) = beside.follow_all(&conversations, way.exactness(exactness));
+    if stale && let Some(fresh) = fresh() {
+        *beside = fresh;
+    }
+    let recorded = (exactness.tolerance, capabilities);
+    let driven = Driven::new(facts.plan, events, way, recorded, &outcome);
+    // In real time a record does not hold every moment at which the master was asked.
+    let driven = driven.filter(|_| rig.is_simulated());
+    let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
+    let facts = AttemptFacts {
+        conversations: &conversations,
+        comparisons: &comparisons,
+        ..facts
+    };
+    let assumed = judge(&mut outcome, &facts);
+    let unplaced = facts.unplaced;
+    let beside = BesideTwin {
+        conversations,
+        comparisons,
+        driven,
+        assumed: Header::default(),
+    };
+    Attempt {
+        master_is_right,
+        unplaced,
+        opening,
+        own: Some(Arc::new(beside.with(assumed))),
+        ..Attempt::new(outcome, Vec::new())
     }
 }
 
@@ -138,10 +190,9 @@ mod tests {
     use super::*;
     use crate::twin::{Role, Symptom};
     use Verdict::{Failed, Inconclusive, Marginal, Passed};
-    use harness_bench::scenario::run::{Outcome, Unready};
+    use harness_bench::scenario::run::Unready;
     use harness_proto::line::Received;
     use harness_proto::time::Instant;
-    use std::sync::Arc;
 
     const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";
     const OTHER: &str = "cell FF00 of drive 0: it does not answer ResetH8";

@@ -26,8 +26,8 @@ pub(crate) mod sim;
 pub(crate) mod walk;
 pub(crate) mod wrong_parity;
 
+pub(crate) use beside::OnRings;
 pub(crate) use beside::PlayedOnRings;
-pub(crate) use beside::{BesideTwin, OnRings};
 pub(crate) use condition::condition;
 pub(crate) use driven::Driven;
 pub(crate) use health::examine;

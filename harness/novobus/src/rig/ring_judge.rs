@@ -1,16 +1,14 @@
 //! The attempts of a record on rings, judged again.
 
-use super::BesideTwin;
 use super::able::possible;
-use super::driven::Driven;
-use super::judge::{AttemptFacts, judge, known};
+use super::beside::judged;
+use super::judge::{AttemptFacts, known};
 use super::open::line_rate;
 use super::reach::{heard, keeping_parity, reached};
-use super::run::{Way, not_played, opening, play_one, twin};
+use super::run::{Way, not_played, play_one, twin};
 use super::session::unhealthy;
 use super::walk::Walks;
 use crate::language::read::RingScenario;
-use crate::language::syntax::Header;
 use crate::qualify::{
     QualificationFacts, TRIALS, conversations, of_parts, of_run, probes, thorough,
 };
@@ -29,7 +27,6 @@ use harness_bench::scenario::source::Source;
 use harness_proto::line::Rate;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
-use std::sync::Arc;
 
 /// Judges the attempts of a record on rings.
 pub(crate) struct RingJudge {
@@ -233,48 +230,26 @@ impl RecordJudge for RingJudge {
         plan.master = own.or(plan.master);
         let mut replay = self.replay(recorded.events);
         let exact = replay.is_exact();
-        let mut outcome = match play_one(&mut replay, &plan, &way) {
+        let outcome = match play_one(&mut replay, &plan, &way) {
             Ok(outcome) => outcome,
             Err((ring, ill)) => Outcome::rig_error(unhealthy(rig, ring, ill).to_string()),
         };
-        let simulated = rig.is_simulated();
-        let all = Conversation::all(recorded.events, self.rate.byte_time(), simulated);
-        let opening = opening(rig, &way, &all, self.exactness);
-        let (conversations, anew) = way.compared(all, self.exactness);
-        if anew && let Ok(fresh) = twin(rig, &known(rig)) {
-            self.twin = fresh;
-        }
-        let exactness = way.exactness(self.exactness);
-        let (comparisons, stale) = self.twin.follow_all(&conversations, exactness);
-        let capabilities = (self.exactness.tolerance, self.capabilities.as_slice());
-        let driven = Driven::new(&plan, recorded.events, &way, capabilities, &outcome);
-        let driven = driven.filter(|_| simulated);
-        let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
+        let byte_time = self.rate.byte_time();
+        let said = Conversation::all(recorded.events, byte_time, rig.is_simulated());
         let facts = AttemptFacts {
             rig,
             plan: &plan,
             way: &way,
             exactness: self.exactness,
-            conversations: &conversations,
-            comparisons: &comparisons,
+            conversations: &[],
+            comparisons: &[],
             unplaced: recorded.unplaced,
             alive: &|| {},
         };
-        let assumed = judge(&mut outcome, &facts);
-        let mut attempt = Attempt::new(outcome, Vec::new());
-        (attempt.opening, attempt.unplaced) = (opening, recorded.unplaced);
-        if self.qualifies {
-            let beside = BesideTwin {
-                conversations,
-                comparisons,
-                driven,
-                assumed: Header::default(),
-            };
-            attempt.master_is_right = master_is_right;
-            attempt.own = Some(Arc::new(beside.with(assumed)));
-        }
-        if stale {
-            self.fresh();
+        let recorded = (recorded.events, self.capabilities.as_slice());
+        let mut attempt = judged(facts, said, recorded, outcome, &mut self.twin);
+        if !self.qualifies {
+            (attempt.master_is_right, attempt.own) = (true, None);
         }
         Ok(RepeatedVerdict {
             attempt,

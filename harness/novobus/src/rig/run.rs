@@ -1,10 +1,9 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
-use super::beside::{BesideTwin, is_late_elsewhere};
-use super::driven::Driven;
+use super::beside::{is_late_elsewhere, judged};
 use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
-use super::judge::{AttemptFacts, judge, known};
+use super::judge::{AttemptFacts, known};
 use super::put_back::{begin, remember, within};
 use super::session::{self, OfRings as _, Session};
 use super::sim;
@@ -15,7 +14,7 @@ use crate::language::syntax::Header;
 use crate::link::SimulatedLink;
 use crate::rig::sim::RigOfRings;
 use crate::simulate;
-use crate::twin::{Comparison, Conversation, Exactness, Twin, answered};
+use crate::twin::{Conversation, Exactness, Twin, answered};
 use harness_bench::counted::counted;
 use harness_bench::guard::Guarded;
 use harness_bench::link::{
@@ -226,56 +225,33 @@ impl<'s> Run<'s> {
         let outcome = examined.map(|()| play_examined(&mut recording, plan, &way));
         let rings = way.rings.len();
         let traces = (0..rings).map(|ring| recording.trace(ring)).collect();
-        let mut outcome = match outcome {
+        let outcome = match outcome {
             Ok(outcome) => outcome,
             Err((ring, ill)) if self.session.drives().ill_as_well => {
                 Outcome::rig_error(session::unhealthy(self.session.rig(), ring, ill).to_string())
             }
             Err((ring, ill)) => return Err(session::unhealthy(self.session.rig(), ring, ill)),
         };
-        let all = Conversation::all(&both.events, self.byte_time, simulated);
-        if let (false, Some(last)) = (simulated, all.last()) {
+        let said = Conversation::all(&both.events, self.byte_time, simulated);
+        if let (false, Some(last)) = (simulated, said.last()) {
             drop_late(self.session.link(), &way.rings, last);
         }
         // Bytes that do not come may be those of another program.
-        let ports = self.session.link().inner_mut().ports_mut();
-        let unplaced = ports.map_or(0, |ports| ports.take_unplaced());
-        let opening = opening(self.session.rig(), &way, &all, self.exactness);
-        let (conversations, fresh) = way.compared(all, self.exactness);
-        if fresh && let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
-            self.twin = twin;
-        }
-        let comparisons = self.follow(&conversations, &way);
-        let recorded = (self.exactness.tolerance, capabilities.as_slice());
-        let driven = Driven::new(plan, &both.events, &way, recorded, &outcome);
-        // In real time a record does not hold every moment at which the master was asked.
-        let driven = driven.filter(|_| simulated);
-        let alive = || self.alive();
+        let unplaced = self.session.take_unplaced();
+        let beats = self.beats.clone();
         let facts = AttemptFacts {
             rig: self.session.rig(),
             plan,
             way: &way,
             exactness: self.exactness,
-            conversations: &conversations,
-            comparisons: &comparisons,
+            conversations: &[],
+            comparisons: &[],
             unplaced,
-            alive: &alive,
+            alive: &|| beat(beats.as_deref()),
         };
-        let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-        let assumed = judge(&mut outcome, &facts);
-        let beside = BesideTwin {
-            conversations,
-            comparisons,
-            driven,
-            assumed: Header::default(),
-        };
-        Ok(Attempt {
-            master_is_right,
-            unplaced,
-            opening,
-            own: Some(Arc::new(beside.with(assumed))),
-            ..Attempt::new(outcome, traces)
-        })
+        let recorded = (both.events.as_slice(), capabilities.as_slice());
+        let attempt = judged(facts, said, recorded, outcome, &mut self.twin);
+        Ok(Attempt { traces, ..attempt })
     }
 
     /// How attempts go on this rig.
@@ -407,18 +383,6 @@ impl<'s> Run<'s> {
     /// Resets no drive any more before a scenario: for a ring with a drive that does not answer `ResetH8` as it should.
     pub(crate) fn leave_as_they_are(&mut self) {
         self.as_they_are = true;
-    }
-
-    fn follow(&mut self, conversations: &[Conversation], way: &Way) -> Vec<Comparison> {
-        let exactness = way.exactness(self.exactness);
-        let (comparisons, stale) = self.twin.follow_all(conversations, exactness);
-        if stale {
-            // It has heard something else than the drives; another one begins like them.
-            if let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
-                self.twin = twin;
-            }
-        }
-        comparisons
     }
 }
 
