@@ -267,10 +267,7 @@ impl<D: CommandDrives> HeldBench for HeldPort<D> {
 
     fn resume(&mut self) -> Result<(), Failure> {
         let session = self.session();
-        if let Some(ports) = session.ports() {
-            ports.resume();
-        }
-        session.link().reset_after_denial();
+        session.go_on();
         session.drives().forget();
         let said = |safe: Safe| Failure::Said(Exit::NotSafe, safe.to_string());
         self.0.clear_up().map_err(said)

@@ -7,7 +7,7 @@ use super::hook::{self, HookError};
 /// A rig whose hook `before` has run and whose power is on. However its use ends, and where it could not be opened at all, the
 /// hook `after` runs, and after an error `on_error` too.
 #[derive(Debug)]
-pub struct Around {
+pub(super) struct Around {
     rig: Rig,
     /// Switches that were off before.
     switched: Vec<String>,
@@ -20,7 +20,7 @@ impl Around {
     ///
     /// # Errors
     /// A program did not do its work; what was switched on is off again.
-    pub fn begin(rig: &Rig) -> Result<Self, Box<HookError>> {
+    pub(super) fn begin(rig: &Rig) -> Result<Self, Box<HookError>> {
         run(rig, "before", rig.file.hooks.before.as_ref())?;
         let mut around = Self {
             rig: rig.clone(),
@@ -39,17 +39,17 @@ impl Around {
     }
 
     /// Notes that the rig has been opened: its power stays on unless its safe state requires it off.
-    pub fn used(&mut self) {
+    pub(super) fn used(&mut self) {
         self.used = true;
     }
 
     /// Switches every power off and asks each that can be asked whether it is. What went wrong, in sentences.
-    pub fn power_off(&self) -> Vec<String> {
+    pub(super) fn power_off(&self) -> Vec<String> {
         power_off(&self.rig)
     }
 
     /// Runs the hook `after`, and `on_error` after an error. What went wrong, in sentences.
-    pub fn end(&mut self, error: bool) -> Vec<String> {
+    pub(super) fn end(&mut self, error: bool) -> Vec<String> {
         if std::mem::replace(&mut self.ended, true) {
             return Vec::new();
         }
@@ -79,7 +79,7 @@ impl Drop for Around {
 }
 
 /// Switches every power of a rig off. What went wrong, in sentences.
-pub fn power_off(rig: &Rig) -> Vec<String> {
+pub(super) fn power_off(rig: &Rig) -> Vec<String> {
     let all = rig.file.power.iter();
     all.filter_map(|(name, power)| switch_off(rig, name, power))
         .collect()

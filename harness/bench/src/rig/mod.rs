@@ -4,7 +4,7 @@
 //! with its place, and [`find`](mod@find) a rig by its name. [`lock`] locks rigs and ports, and [`state`] keeps the locks and
 //! which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
-pub mod around;
+mod around;
 pub mod buses;
 pub mod check;
 pub mod check_port;
@@ -14,21 +14,21 @@ pub mod ends;
 pub mod file;
 pub mod find;
 pub mod hook;
-pub mod in_use;
+mod in_use;
 pub mod left;
 pub mod lock;
-pub mod permitted;
-pub mod played;
+mod permitted;
+mod played;
 pub mod playing;
 pub mod port_file;
 pub mod profile;
 pub mod rings;
 pub mod scan;
 pub mod session;
-pub mod session_error;
+mod session_error;
 pub mod state;
-pub mod taken;
-pub mod watchdog;
+mod taken;
+mod watchdog;
 
 pub use check::{Rig, parse, parse_beside};
 pub use ends::Ends;

@@ -299,6 +299,11 @@ impl<D: RigDrives> RigSession<D> {
     /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.
     pub fn resume(&mut self) {
         self.link.clear_the_way();
+        self.go_on();
+    }
+
+    /// Makes the link of use again after a denial or a request that was cancelled.
+    pub fn go_on(&mut self) {
         if let Some(ports) = self.ports() {
             ports.resume();
         }

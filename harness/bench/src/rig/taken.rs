@@ -9,9 +9,9 @@ use super::state;
 
 /// A rig in the hands of this program, before its ports are opened. The lock is given back last.
 #[derive(Debug)]
-pub struct Taken {
-    pub around: Around,
-    pub lock: Option<RigLock>,
+pub(super) struct Taken {
+    pub(super) around: Around,
+    pub(super) lock: Option<RigLock>,
 }
 
 impl Taken {
@@ -26,7 +26,7 @@ impl Taken {
 }
 
 /// Takes a rig. A simulated one needs no lock.
-pub fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
+pub(super) fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
     let forbidden = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
         rig: rig.id().to_owned(),
         since: quarantine.since.clone(),

@@ -74,14 +74,14 @@ impl LastBeat {
 
 /// A watchdog on duty; it leaves when this is dropped.
 #[derive(Debug)]
-pub struct Watchdog {
+pub(super) struct Watchdog {
     _leash: Sender<()>,
 }
 
 impl Watchdog {
     /// Watches a count that goes up while the program lives. Where it stands still for `limit`, `stop` is done, which returns what has
     /// failed, and the alarm sounds.
-    pub fn start(
+    pub(super) fn start(
         beats: Arc<AtomicU64>,
         limit: Duration,
         stop: impl FnOnce() -> Vec<String> + Send + 'static,
@@ -114,7 +114,7 @@ impl Watchdog {
 
 /// Watches over a rig as its file says: where the count of `beats` stands still for too long, each port gets the words that are its own then,
 /// and power that belongs to the safe state is switched off.
-pub fn watch_over(
+pub(super) fn watch_over(
     rig: &Rig,
     beats: Arc<AtomicU64>,
     (ports, words): (

@@ -262,11 +262,8 @@ impl HeldBench for HeldRings {
     fn resume(&mut self) -> Result<(), Failure> {
         self.bench = None;
         self.rig.with(|session| {
+            session.go_on();
             let link = session.link();
-            if let Some(ports) = link.inner_mut().ports_mut() {
-                ports.resume();
-            }
-            link.reset_after_denial();
             // Unless everything is allowed, nothing but the recovery passes where the guard does not know where the drives are (9.8).
             if !link.limits().allow_everything() {
                 link.synchronise();
