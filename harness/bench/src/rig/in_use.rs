@@ -44,7 +44,7 @@ impl UseOptions {
 }
 
 /// How a session ended.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct End {
     /// Whether every drive stands and is blocked; `None` for rings that are simulated in the program.
     pub safe: Option<Safe>,

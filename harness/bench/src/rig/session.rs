@@ -360,13 +360,9 @@ impl<D: RigDrives> RigSession<D> {
         self.end(error)
     }
 
-    /// The same of a session that is dropped soon.
+    /// As [`Self::close`], of a session that its owner cannot give away: it carries nothing more.
     pub fn end(&mut self, error: bool) -> End {
-        let mut end = End {
-            safe: None,
-            power: Vec::new(),
-            remarks: Vec::new(),
-        };
+        let mut end = End::default();
         if std::mem::replace(&mut self.ended, true) {
             end.remarks = D::leave(self, None);
             self.watchdog = None;

@@ -277,10 +277,6 @@ impl HeldBench for HeldRings {
         if let Some(bench) = self.bench.take() {
             bench.bus.clone().close();
         }
-        self.rig.close(error).unwrap_or(End {
-            safe: None,
-            power: Vec::new(),
-            remarks: Vec::new(),
-        })
+        self.rig.close(error).unwrap_or_default()
     }
 }
