@@ -84,11 +84,6 @@ fn leave_clean(session: &mut Session, output: &mut Output) {
     }
 }
 
-/// How many drives the rings of a rig have.
-pub(crate) fn sizes(rig: &Rig) -> Vec<u8> {
-    rig.rings().map(|(_, ring)| ring.drives).collect()
-}
-
 /// The rings of a rig, and where faults can be put on them.
 pub(crate) fn rings(
     rig: &Rig,

@@ -1,6 +1,6 @@
 //! `drivebench fuzz replay` on rings: a minute on hardware.
 
-use super::{on_ports, rings, scope, simulated, sizes};
+use super::{on_ports, rings, scope, simulated};
 use crate::explore::{
     Act, ActKind, Case, CaseScope, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
 };
@@ -29,7 +29,7 @@ pub(super) fn replay(
         Err(error) => return Ok(tell(&error, output)),
     };
     if cases.is_empty() {
-        let sizes: Vec<_> = sizes(rig).iter().map(u8::to_string).collect();
+        let sizes: Vec<_> = rig.sizes().iter().map(u8::to_string).collect();
         output.complain(&format!(
             "{} holds no case for a ring of {}",
             arguments.folder.display(),
@@ -39,7 +39,7 @@ pub(super) fn replay(
     }
     if rig.is_simulated() {
         let setup = RingSetup::of_rig(rig, &[], false);
-        let mut target = match OnSim::ready(setup.clone(), &sizes(rig)) {
+        let mut target = match OnSim::ready(setup.clone(), &rig.sizes()) {
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
         };

@@ -1,6 +1,6 @@
 //! `drivebench fuzz run` on rings.
 
-use super::{on_ports, scope, simulated, sizes};
+use super::{on_ports, scope, simulated};
 use crate::explore::{
     Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, RingSetup, planted_setup,
 };
@@ -105,7 +105,7 @@ fn on_simulated(
         ..Limits::default()
     };
     let scope = simulated(rig, limits, &setup);
-    let mut target = match OnSim::ready(setup.clone(), &sizes(rig)) {
+    let mut target = match OnSim::ready(setup.clone(), &rig.sizes()) {
         Ok(target) => target,
         Err(error) => return Ok(tell(&error, output)),
     };

@@ -1,7 +1,7 @@
 //! `drivebench shrink` for a finding on rings.
 
 use super::super::rig::find_rig;
-use super::{on_ports, scope, sizes};
+use super::{on_ports, scope};
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{Case, Difference, Finding, OnRig, OnSim, RingSetup};
 use crate::rig::Run;
@@ -49,7 +49,7 @@ pub(super) fn shrink(
     let Some(rig) = find_rig(name, buses, output) else {
         return Ok(Exit::Usage);
     };
-    if rig.is_simulated() || sizes(&rig) != finding.case.sizes() {
+    if rig.is_simulated() || rig.sizes() != finding.case.sizes() {
         let sizes: Vec<_> = finding.case.sizes().iter().map(u8::to_string).collect();
         output.complain(&format!(
             "the finding is of a rig with ports whose rings have the sizes {}, and {name} is another",
