@@ -359,12 +359,10 @@ fn listen(session: &mut Session) -> Result<bool, SessionError> {
     // The zeros of the check sequence, which comes next, end a time-out (ND21 9.9).
     let talks = |place: &(usize, &Vec<Received>)| !place.1.is_empty() && !timed_out(*place);
     match heard.iter().enumerate().find(talks).map(|(ring, _)| ring) {
-        Some(ring) => Err(SessionError::Ill {
-            rig: session.rig().id().to_owned(),
-            ring: ring + 1,
-            ill: Box::new(Unhealthy::talking(&heard[ring])),
-            cause: Some(Box::new(cause::unasked(&heard[ring]))),
-        }),
+        Some(ring) => {
+            let talking = unhealthy(session.rig(), ring, Unhealthy::talking(&heard[ring]));
+            Err(talking.because(cause::unasked(&heard[ring])))
+        }
         None => Ok(true),
     }
 }
@@ -398,37 +396,28 @@ fn make_ready(session: &mut Session) -> Result<(), SessionError> {
 
 /// Adds the likely cause to the error of a ring that did not open.
 fn with_cause(session: &mut Session, error: SessionError) -> SessionError {
-    match error {
-        SessionError::Ill { rig, ring, ill, .. } => {
-            let file = session.rig().file.rings().nth(ring - 1).cloned();
-            let cause = match session.link().trouble() {
-                Some(Trouble::Lost(_)) => {
-                    file.map(|file| LikelyCause::Gone(file.endpoint.transport))
-                }
-                Some(_) => None,
-                None => {
-                    come_round(session.link());
-                    session.link().begin();
-                    let heard = line_test::listen(session.link(), ring - 1);
-                    let drives = file.as_ref().map_or(0, |file| file.drives);
-                    let of_marks = file.and_then(|file| cause::of_marks(&file, &heard));
-                    let ill = ill.downcast_ref().unwrap_or(&Unhealthy::Silent);
-                    let other = || cause::cause(ill, &heard, (drives, stated_rate(session.rig())));
-                    Some(of_marks.unwrap_or_else(other))
-                }
-            };
-            let error = SessionError::Ill {
-                rig,
-                ring,
-                ill,
-                cause: None,
-            };
-            match cause {
-                Some(cause) => error.because(cause),
-                None => error,
-            }
+    let SessionError::Ill { ring, ill, .. } = &error else {
+        return error;
+    };
+    let ring = ring - 1;
+    let file = session.rig().file.rings().nth(ring).cloned();
+    let cause = match session.link().trouble() {
+        Some(Trouble::Lost(_)) => file.map(|file| LikelyCause::Gone(file.endpoint.transport)),
+        Some(_) => None,
+        None => {
+            come_round(session.link());
+            session.link().begin();
+            let heard = line_test::listen(session.link(), ring);
+            let drives = file.as_ref().map_or(0, |file| file.drives);
+            let of_marks = file.and_then(|file| cause::of_marks(&file, &heard));
+            let ill = ill.downcast_ref().unwrap_or(&Unhealthy::Silent);
+            let other = || cause::cause(ill, &heard, (drives, stated_rate(session.rig())));
+            Some(of_marks.unwrap_or_else(other))
         }
-        other => other,
+    };
+    match cause {
+        Some(cause) => error.because(cause),
+        None => error,
     }
 }
 
