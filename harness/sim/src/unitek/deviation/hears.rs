@@ -56,6 +56,14 @@ pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Hears):
         }
         _ => h.as_it_is(),
     };
+    "holds-at-most-1000" "4.5" "A register of 16 bits holds no more than 1000, whatever is written." |h| match h.request {
+        Some(Request::Write { register, data: Data::Short(value) }) => {
+            let least = if Register::of(register).signed { -1000 } else { 0 };
+            let number = Register::of(register).number_of(value.into()).clamp(least, 1000);
+            h.instead(Request::Write { register, data: Data::Short(number as u16) })
+        }
+        _ => h.as_it_is(),
+    };
     "writes-without-sign" "App 1" "16 bits to a register of 32 are extended by zeros, whatever the sign." |h| match h.request {
         Some(Request::Write { register, data: Data::Short(value) }) => {
             let data = Data::Long(value.into());

@@ -47,6 +47,12 @@ const WRONG: [(&str, &str); 23] = [
     ("write-identifier-to-send", "interval-in-two-milliseconds"),
 ];
 
+const AXIS: Axis = Axis {
+    node: 1,
+    rx: 0x201,
+    tx: 0x181,
+};
+
 /// What the names of walks have in them.
 const WALK: &str = "walk-";
 
@@ -80,12 +86,7 @@ fn outcome(run: &mut PortRun<Player>, conversation: &Source) -> Outcome {
 
 /// The conversations that only what right drives send judges, without what the names begin with.
 fn by_frames() -> Vec<(String, Source)> {
-    let axis = Axis {
-        node: 1,
-        rx: 0x201,
-        tx: 0x181,
-    };
-    let all = conversations(&[axis], &Limits::unlimited()).into_iter();
+    let all = conversations(&[AXIS], &Limits::unlimited()).into_iter();
     let kept = all.filter(|source| !source.name.contains(WALK));
     let ours = kept.filter(|source| RigScenario::read(source).expect("a conversation").by_frames);
     let named = ours.map(|source| {
@@ -112,6 +113,24 @@ fn wrong_drives_fail_and_right_ones_pass() {
             let outcome = outcome(&mut bench(&[&line]), source);
             assert_eq!(outcome.verdict, Verdict::Failed, "{name}: {deviation}");
         }
+    }
+}
+
+/// Values that no kept conversation writes show in a walk.
+#[test]
+fn a_register_that_does_not_hold_each_value_is_found() {
+    let all = conversations(&[AXIS], &Limits::unlimited()).into_iter();
+    let highest = |source: &Source| source.text.contains("> 201 2C FF FF");
+    let walk = all.filter(|source| source.name.contains(WALK) && highest(source));
+    let walk: Vec<_> = walk.collect();
+    assert!(!walk.is_empty());
+    for source in &walk {
+        let of = |setup: &[&str]| outcome(&mut bench(setup), source).verdict;
+        assert_eq!(of(&[]), Verdict::Passed);
+        assert_eq!(
+            of(&["drive 1 deviates holds-at-most-1000"]),
+            Verdict::Failed
+        );
     }
 }
 
