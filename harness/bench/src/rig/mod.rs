@@ -37,7 +37,7 @@ pub use find::{FindError, find};
 pub use in_use::{End, UseOptions};
 pub use permitted::standing;
 pub use played::{Again, attempts_of};
-pub use played::{Attempt, Keeper, PlayedScenario};
+pub use played::{Attempt, Keeper, LateByte, PlayedScenario, late_each_time};
 pub use profile::{KnownProfile, Profile, ProfileError, ProfileSetup, SettledProperty};
 pub use session_error::SessionError;
 pub use watchdog::Alarm;

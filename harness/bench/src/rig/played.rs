@@ -4,6 +4,7 @@ use super::Rig;
 use crate::link::Sink;
 use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
 use harness_sim::record::Trace;
 use std::any::Any;
 use std::collections::BTreeSet;
@@ -32,6 +33,39 @@ pub fn attempts_of(rig: &Rig, real_time: bool, qualifies: bool) -> usize {
 /// How often drives are made ready before one that gives no answer has failed.
 const MOST_UNREADY: usize = 3;
 
+/// Two delays are the same within this part of the rig's tolerance.
+const ALIKE: u64 = 4;
+
+/// A byte that came at another time than the model says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LateByte {
+    /// Which byte it is, in words that are the same at each attempt.
+    pub which: String,
+    /// How late it was, in nanoseconds; negative if it was early.
+    pub by: i128,
+}
+
+impl LateByte {
+    /// Whether it is the same byte, as late. A drive is late by the same time, a computer by any.
+    fn is_like(&self, other: &Self, tolerance: Span) -> bool {
+        let apart = self.by.abs_diff(other.by);
+        self.which == other.which && apart <= u128::from(tolerance.as_nanos() / ALIKE)
+    }
+}
+
+/// Whether the byte that was late in the last attempt that was played was as late in each of them.
+pub fn late_each_time(attempts: &[Attempt], tolerance: Span) -> bool {
+    let mut played = attempts.iter().filter(|attempt| attempt.was_played());
+    let last = attempts.iter().rfind(|attempt| attempt.was_played());
+    last.and_then(|last| last.late.as_ref())
+        .is_some_and(|late| {
+            played.all(|attempt| {
+                let there = attempt.late.as_ref();
+                there.is_some_and(|there| there.is_like(late, tolerance))
+            })
+        })
+}
+
 /// One attempt at a scenario.
 #[derive(Clone, Debug)]
 pub struct Attempt {
@@ -45,6 +79,8 @@ pub struct Attempt {
     pub master_is_right: bool,
     /// How the bytes received before the drives were reset compare with a ring at rest; `None` where they are judged with the rest.
     pub opening: Option<String>,
+    /// The first byte that was late, where the bus compares times.
+    pub late: Option<LateByte>,
     /// What the bus keeps of it beside that.
     pub own: Option<Arc<dyn Any + Send + Sync>>,
 }
@@ -59,6 +95,7 @@ impl Attempt {
             unplaced: 0,
             master_is_right: true,
             opening: None,
+            late: None,
             own: None,
         }
     }
@@ -177,6 +214,8 @@ fn unanswered_each_time(attempts: &[Attempt]) -> Option<&str> {
 /// When a scenario is played once more.
 #[derive(Clone, Debug)]
 pub struct Again {
+    /// How late a byte may be; zero where time is virtual.
+    tolerance: Span,
     /// How often drives are made ready where one gives no answer.
     unready: usize,
     /// Which drives gave no answer at every attempt at a scenario: it is the drive, then, and not the computer.
@@ -184,10 +223,15 @@ pub struct Again {
 }
 
 impl Again {
-    /// On a rig whose time is real; where it is virtual, no computer is busy, and drives that are not ready never will be.
-    pub fn new(real_time: bool) -> Self {
+    /// On a rig with this tolerance; zero where time is virtual: no computer is busy, and drives that are not ready never will be.
+    pub fn new(tolerance: Span) -> Self {
         Self {
-            unready: if real_time { MOST_UNREADY } else { 1 },
+            tolerance,
+            unready: if tolerance > Span::ZERO {
+                MOST_UNREADY
+            } else {
+                1
+            },
             hopeless: BTreeSet::new(),
         }
     }
@@ -210,8 +254,12 @@ impl Again {
                 self.hopeless.extend(why.map(str::to_owned));
                 false
             }
-            // A busy computer is late sometimes, a drive at the same byte each time.
-            Verdict::Marginal => played < MOST_UNTIMELY,
+            // A busy computer is late sometimes, a drive at the same byte each time. Where another byte was late before, one more attempt shows
+            // nothing else.
+            Verdict::Marginal => {
+                let elsewhere = last.late.is_some() && !late_each_time(attempts, self.tolerance);
+                played < MOST_UNTIMELY && !elsewhere
+            }
             // So is it at a byte that a silence has changed.
             _ => {
                 let (late, failed): (Vec<_>, Vec<_>) = attempts
@@ -228,6 +276,8 @@ impl Again {
 mod tests {
     use super::*;
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
+
+    const TOLERANCE: Span = Span::from_millis(20);
 
     const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";
     const OTHER: &str = "cell FF00 of drive 0: it does not answer ResetH8";
@@ -291,7 +341,7 @@ mod tests {
 
     #[test]
     fn whatever_does_not_pass_is_played_again_as_often_as_it_may_be() {
-        let again = &mut Again::new(true);
+        let again = &mut Again::new(TOLERANCE);
         assert_eq!(attempts(again, 3, &[(Passed, "")]), 1);
         assert_eq!(attempts(again, 3, &[(Verdict::RigError, "")]), 1);
         assert_eq!(attempts(again, 1, &[(Failed, "")]), 1);
@@ -306,6 +356,30 @@ mod tests {
         assert_eq!(attempts(again, 3, &turns), 4);
     }
 
+    /// An attempt in which this byte was late by ms.
+    fn late(which: &str, by: i128) -> Attempt {
+        let late = Some(LateByte {
+            which: which.to_owned(),
+            by: by * 1_000_000,
+        });
+        Attempt {
+            late,
+            ..attempt(Marginal, "")
+        }
+    }
+
+    /// Bytes that are late at other places each time were late in the computer: a third attempt shows nothing else.
+    #[test]
+    fn bytes_that_are_late_elsewhere_end_the_attempts() {
+        let mut again = Again::new(TOLERANCE);
+        let mut more = |played: &[Attempt]| again.after(played, 3);
+        assert!(more(&[late("a", 40)]));
+        assert!(more(&[late("a", 40), late("a", 45)]));
+        assert!(!more(&[late("a", 40), late("b", 40)]));
+        assert!(!more(&[late("a", 40), late("a", 90)]));
+        assert!(more(&[late("a", 40), attempt(Failed, "")]));
+    }
+
     /// ND21 9.9: drives that monitor time-outs change their bytes behind a silence of the computer.
     #[test]
     fn a_late_computer_takes_no_attempt_from_what_fails() {
@@ -314,7 +388,7 @@ mod tests {
             own.outcome.shows_nothing = true;
             own
         };
-        let mut again = Again::new(true);
+        let mut again = Again::new(TOLERANCE);
         let mut more = |played: &[Attempt], most| again.after(played, most);
         assert!(more(&[late()], 1));
         assert!(more(&[late(), late(), late()], 2));
@@ -328,7 +402,7 @@ mod tests {
 
     #[test]
     fn a_silent_drive_is_made_ready_again_as_the_computer_may_have_disturbed_it() {
-        let again = &mut Again::new(true);
+        let again = &mut Again::new(TOLERANCE);
         assert_eq!(attempts(again, 1, &[(Failed, DIFFERS)]), 1);
         let disturbed = [(Failed, SILENT), (Passed, "")];
         assert_eq!(attempts(again, 1, &disturbed), 2);
@@ -342,7 +416,7 @@ mod tests {
 
     #[test]
     fn nothing_disturbs_a_drive_where_time_is_virtual() {
-        let again = &mut Again::new(false);
+        let again = &mut Again::new(Span::ZERO);
         assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 

@@ -21,11 +21,10 @@ pub(super) fn differences(
     judged: &[JudgedAttempt<'_>],
     texts: Texts<'_>,
 ) -> Vec<String> {
-    let real = opened.header.tolerance > Span::ZERO;
     let mut settling = Settling {
         opened,
         texts,
-        retries: Retries::new(real),
+        retries: Retries::new(opened.header.tolerance),
         wrong: Vec::new(),
         verdicts: Vec::new(),
     };

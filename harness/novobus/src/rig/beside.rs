@@ -7,7 +7,7 @@ use super::run::{opening, twin};
 use crate::language::syntax::Header;
 use crate::twin::{Comparison, Conversation, Divergence, Twin};
 use harness_bench::link::{Capability, LinkEvent};
-use harness_bench::rig::{Attempt, PlayedScenario};
+use harness_bench::rig::{Attempt, PlayedScenario, late_each_time};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -90,7 +90,17 @@ pub(super) fn judged(
         master_is_right,
         unplaced,
         opening,
-        own: Some(Arc::new(beside.with(assumed))),
+        ..kept(outcome, beside.with(assumed))
+    }
+}
+
+/// An attempt with what stands beside its outcome.
+fn kept(outcome: Outcome, beside: BesideTwin) -> Attempt {
+    let mut comparisons = beside.comparisons.iter();
+    let late = comparisons.find_map(|comparison| comparison.untimely.as_ref());
+    Attempt {
+        late: late.map(Divergence::late_byte),
+        own: Some(Arc::new(beside)),
         ..Attempt::new(outcome, Vec::new())
     }
 }
@@ -161,28 +171,9 @@ impl PlayedOnRings for PlayedScenario {
 
     fn late_each_time(&self, tolerance: Span) -> Option<&Divergence> {
         let late = self.last_played()?.untimely()?;
-        let same = is_late_each_time(&self.attempts, late, tolerance);
+        let same = late_each_time(&self.attempts, tolerance);
         (self.outcome.verdict == Verdict::Marginal && same).then_some(late)
     }
-}
-
-/// Whether a byte was late at each of these attempts, at the same place and by the same time.
-fn is_late_each_time(attempts: &[Attempt], late: &Divergence, tolerance: Span) -> bool {
-    let like = |attempt: &Attempt| {
-        let there = attempt.untimely();
-        there.is_some_and(|there| there.is_like(late, tolerance))
-    };
-    let mut played = attempts.iter().filter(|own| own.was_played());
-    played.all(like)
-}
-
-/// Whether the last attempt has late bytes, at another place than one before: the computer was late, and one more attempt shows nothing else.
-pub(super) fn is_late_elsewhere(attempts: &[Attempt], tolerance: Span) -> bool {
-    let marginal = attempts
-        .last()
-        .filter(|own| own.outcome.verdict == Verdict::Marginal);
-    let late = marginal.and_then(OnRings::untimely);
-    late.is_some_and(|own| !is_late_each_time(attempts, own, tolerance))
 }
 
 #[cfg(test)]
@@ -236,10 +227,7 @@ mod tests {
             comparisons: vec![comparison],
             ..NOTHING.clone()
         };
-        Attempt {
-            own: Some(Arc::new(beside)),
-            ..attempt
-        }
+        kept(attempt.outcome, beside)
     }
 
     fn tells(attempts: Vec<Attempt>) -> bool {
@@ -282,17 +270,5 @@ mod tests {
         assert!(!each_time(vec![late(3, 40), late(3, 40), passed]));
         let unready = differing(attempt(Failed, SILENT), 0, None);
         assert!(each_time(vec![late(3, 40), unready, late(3, 40)]));
-    }
-
-    /// Bytes that are late at other places each time were late in the computer: a third attempt shows nothing else.
-    #[test]
-    fn bytes_that_are_late_elsewhere_end_the_attempts() {
-        let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
-        let elsewhere = |attempts: &[Attempt]| is_late_elsewhere(attempts, Span::from_millis(20));
-        assert!(!elsewhere(&[late(3, 40)]));
-        assert!(!elsewhere(&[late(3, 40), late(3, 45)]));
-        assert!(elsewhere(&[late(3, 40), late(5, 40)]));
-        assert!(elsewhere(&[late(3, 40), late(3, 90)]));
-        assert!(!elsewhere(&[late(3, 40), attempt(Failed, "")]));
     }
 }

@@ -1,7 +1,7 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
-use super::beside::{is_late_elsewhere, judged};
+use super::beside::judged;
 use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
 use super::judge::{AttemptFacts, known};
 use super::put_back::{begin, remember, within};
@@ -112,7 +112,7 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
-            again: Again::new(tolerance > Span::ZERO),
+            again: Again::new(tolerance),
             repeats: false,
             played: false,
             as_they_are: false,
@@ -184,9 +184,7 @@ impl<'s> Run<'s> {
                 keeper.ends(number, &attempt);
             }
             attempts.push(attempt);
-            let again = self.again.after(&attempts, most)
-                && !is_late_elsewhere(&attempts, self.exactness.tolerance);
-            if !again || self.session.link().trouble().is_some() {
+            if !self.again.after(&attempts, most) || self.session.link().trouble().is_some() {
                 return Ok(PlayedScenario::of(attempts));
             }
         }

@@ -1,5 +1,6 @@
 //! The options and the result of a comparison with a twin.
 
+use harness_bench::rig::LateByte;
 use harness_proto::line::Received;
 use harness_proto::novobus::role::Role;
 use harness_proto::time::{Instant, Span};
@@ -102,19 +103,14 @@ pub(crate) struct Divergence {
     pub drive: Option<u8>,
 }
 
-/// Two delays are the same within this part of the rig's tolerance.
-const ALIKE: u64 = 4;
-
 impl Divergence {
-    /// Whether another conversation differed at the same place and in the same way, and equally late or early within a part of the tolerance.
-    #[must_use]
-    pub(crate) fn is_like(&self, other: &Self, tolerance: Span) -> bool {
-        let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
-        let apart = self.late_by().abs_diff(other.late_by());
-        // A drive is late by the same time, a computer by any.
-        place(self) == place(other)
-            && self.what == other.what
-            && apart <= u128::from(tolerance.as_nanos() / ALIKE)
+    /// Which byte was late, and by how much.
+    pub(crate) fn late_byte(&self) -> LateByte {
+        let place = (self.ring, self.role, self.step, self.drive, self.what);
+        LateByte {
+            which: format!("{place:?}"),
+            by: self.late_by(),
+        }
     }
 
     /// How late the byte was, in nanoseconds; negative if it was early.

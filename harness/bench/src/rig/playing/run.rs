@@ -123,7 +123,7 @@ impl<P: PortPlayer> PortRun<P> {
         player.shows_life(session.beats());
         player.tells(session.left().clone());
         Self {
-            again: Again::new(!session.rig().is_simulated()),
+            again: Again::new(P::segment(session.rig(), options.allow_motion).tolerance),
             notes: session.left().take_before().into_iter().collect(),
             session,
             player,
@@ -173,10 +173,10 @@ impl<P: PortPlayer> PortRun<P> {
     /// Forgets what is known of the drives: others have used them.
     pub(crate) fn forget_drives(&mut self) {
         let (rig, options) = (self.session.rig(), &self.options);
+        self.again = Again::new(P::segment(rig, options.allow_motion).tolerance);
         self.player = P::new(rig, options.allow_motion, options.ill_as_well);
         self.player.shows_life(self.session.beats());
         self.player.tells(self.session.left().clone());
-        self.again = Again::new(!self.session.rig().is_simulated());
         self.over = None;
     }
 
