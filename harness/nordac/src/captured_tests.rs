@@ -348,7 +348,7 @@ fn pieces_of_an_adapter_are_joined() {
     }
     // An octet is lost: what it belonged to was not compared, and nothing passes.
     // A short confirmation leaves nothing behind, as a slave that does not reply.
-    for lost in (0..octets.len()).filter(|octet| octets[*octet] != 0xE5) {
+    for lost in (0..octets.len()).filter(|place| octets[*place] != 0xE5) {
         let mut octets = octets.clone();
         octets.remove(lost);
         let file = pcap(250, serial(0x04, &pieces(&octets, 16)));
@@ -365,7 +365,7 @@ fn pieces_of_an_adapter_are_joined() {
     let mut near = pieces(&octets, 16);
     near.iter_mut()
         .zip(1..)
-        .for_each(|(change, place)| change.0 = place * 125_000);
+        .for_each(|((at, _), place)| *at = place * 125_000);
     for event in [0x02, 0x04] {
         assert_eq!(verdict(&pcap(250, serial(event, &near)), &["bus"]), PASSED);
     }

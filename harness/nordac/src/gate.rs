@@ -183,7 +183,7 @@ pub(crate) trait GuardsSlaves {
     /// What the gate of a line of NORDAC inverters knows, if this line has one.
     fn slaves(&self) -> Option<&guard::Gate>;
 
-    /// The same, to tell it what was read.
+    /// The gate, mutable, to be told what was read.
     fn slaves_mut(&mut self) -> Option<&mut guard::Gate>;
 }
 

@@ -234,7 +234,7 @@ fn why_a_slave_refuses_its_master_is_said() {
         (&[0xF1], "PPO3, to which the slave is set (1622), is F1"),
         (&[0xF5], "PPO4, to which the slave is set (1622), is F5"),
     ];
-    for (place, (cfg, refusal)) in configurations.iter().enumerate() {
+    for (place, (cfg, about)) in configurations.iter().enumerate() {
         let header = format!("slave 8 ppo {}\n", place + 1);
         let header = Source::from_bytes("setup".into(), header.into_bytes()).expect("a text");
         let plan = bench(None, Some(&header)).expect("a bench");
@@ -274,7 +274,7 @@ fn why_a_slave_refuses_its_master_is_said() {
             } else {
                 shown.join(" ")
             };
-            let why = format!("its configuration is {shown}, and that of {refusal}");
+            let why = format!("its configuration is {shown}, and that of {about}");
             rows.push((chk_cfg(2, other), why));
         }
         rows.push((right.clone(), String::new()));

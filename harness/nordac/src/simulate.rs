@@ -138,7 +138,7 @@ impl Bench {
         Self::with_guests(setup, 0)
     }
 
-    /// The same with this number of hosts more, after the slaves.
+    /// A bench with this number of additional hosts after the slaves.
     #[must_use]
     pub(super) fn with_guests(setup: &Setup, guests: usize) -> Self {
         let bench = Member::Host(LineHost::default());

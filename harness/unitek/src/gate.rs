@@ -177,7 +177,7 @@ pub(crate) trait GuardsSegment {
     /// What the gate of a segment knows, if this line has one.
     fn segment(&self) -> Option<&guard::Gate>;
 
-    /// The same, to tell it what was read.
+    /// The gate, mutable, to be told what was read.
     fn segment_mut(&mut self) -> Option<&mut guard::Gate>;
 }
 

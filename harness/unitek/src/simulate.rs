@@ -146,7 +146,7 @@ impl Bench {
         Self::with_guests(setup, 0)
     }
 
-    /// The same with hosts for `guests` on the segment.
+    /// A bench with the drives of a setup and hosts for `guests` on the segment.
     #[must_use]
     pub(crate) fn with_guests(setup: &Setup, guests: usize) -> Self {
         Self {
@@ -460,7 +460,8 @@ mod tests {
         assert_eq!(came, [(end, "181#1BD80100".to_owned())]);
         assert!(!bench.busy());
         let trace = bench.trace(0);
-        let from: Vec<_> = trace.channels[0].frames().iter().map(|f| f.from).collect();
+        let frames = trace.channels[0].frames().iter();
+        let from: Vec<_> = frames.map(|frame| frame.from).collect();
         assert_eq!(from, [None, Some(1)]);
     }
 

@@ -251,7 +251,7 @@ impl Desk {
     /// Sends, and takes what has come until the line is idle.
     fn send(&mut self, octets: &[u8]) -> Option<SlaveReply> {
         let slot = RATE.bit_time() * SLOT_BITS;
-        let words = octets.iter().copied().map(Into::into).collect();
+        let outgoing = octets.iter().copied().map(Into::into).collect();
         let wish = Wish {
             ready: self.now,
             idle_bits: SYN_BITS,
@@ -261,7 +261,7 @@ impl Desk {
         self.log.push(MasterPiece::Sent(self.now, sent));
         let host = self.line.station_mut(MASTER).host_mut()?;
         host.forget();
-        host.send(wish, words);
+        host.send(wish, outgoing);
         let sent = self.now + RATE.bit_time() * SYN_BITS + RATE.octet_time() * octets.len() as u64;
         self.run(sent + slot);
         while self.line.is_busy() {

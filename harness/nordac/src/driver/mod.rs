@@ -37,7 +37,7 @@ const TRIES: u8 = 2;
 
 /// How many slots a start may take: the master listens for 10 of them before it claims the line.
 const START_SLOTS: u64 = 40;
-/// And for how long beside them.
+/// How much longer than these slots a start may take.
 const START: Span = Span::from_millis(2_000);
 
 /// How a driver uses its line.
@@ -52,7 +52,7 @@ impl Options {
     /// The usual watchdog: longer than a busy computer is late.
     pub(crate) const WATCHDOG: Span = Span::from_millis(1_000);
 
-    /// Those of a line in virtual time.
+    /// The options of a line in virtual time.
     #[cfg(test)]
     pub(crate) fn simulated(rate: BusRate) -> Self {
         Self {

@@ -125,7 +125,7 @@ impl<'l> Wire<'l> {
         &*self.line
     }
 
-    /// The same over another handle of the line.
+    /// The wire over another handle of the line.
     pub(super) fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Wire<'b> {
         Wire {
             line,

@@ -16,7 +16,7 @@ pub(super) struct Tasks {
 }
 
 impl Default for Tasks {
-    /// Those of an exchange that was under way before: one answer is shown, and another may be due.
+    /// The tasks of an exchange that was under way before: one answer is shown, and another may be due.
     fn default() -> Self {
         Self::after(2)
     }
@@ -44,7 +44,7 @@ impl Tasks {
         }
     }
 
-    /// Those of an exchange that begins: nothing is due.
+    /// The tasks of an exchange that begins: nothing is due.
     pub(super) const fn begun() -> Self {
         Self::after(1)
     }

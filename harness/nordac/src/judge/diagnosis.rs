@@ -12,7 +12,7 @@ const ZERO: [u8; 3] = [0xB1, 0xC2, 0xFF];
 pub(super) fn wrong(data: &[u8]) -> Option<String> {
     let Some(sent) = Diagnosis::decode(data) else {
         return Some(format!(
-            "a sent of {} is sent: 6, or 8 are expected",
+            "a diagnosis of {} is sent: 6, or 8 are expected",
             counted(data.len(), "octet")
         ));
     };

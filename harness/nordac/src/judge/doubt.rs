@@ -24,7 +24,7 @@ pub(super) enum Sender {
 }
 
 impl Sender {
-    /// Those of telegrams in order of time.
+    /// The senders of telegrams that are in order of time.
     pub(super) fn of_all(runs: &[TelegramRun]) -> Vec<Self> {
         let octets = runs
             .iter()

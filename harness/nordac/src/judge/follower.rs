@@ -23,7 +23,7 @@ pub(super) enum Way {
         right: bool,
         watchdog: bool,
     },
-    /// And Chk_Cfg of the same master after it.
+    /// Chk_Cfg of the same master was confirmed after it.
     Configured {
         master: u8,
         ppo: Option<PpoType>,
@@ -88,7 +88,7 @@ impl Follower {
         }
     }
 
-    /// The same slave, switched off and on.
+    /// A follower of the slave after its power was off and on.
     pub(super) fn restarted(&self) -> Self {
         Self {
             way: Way::Waits,

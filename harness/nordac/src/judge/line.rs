@@ -132,7 +132,7 @@ fn is_begun(run: &TelegramRun) -> bool {
     said.is_some_and(|said| matches!(Telegram::decode(&said.octets), Decoded::NeedMore))
 }
 
-/// The same of octets that stations sent without a pause, from the first telegram of the line on.
+/// Judges octets that stations sent without a pause, from the first telegram of the line on.
 pub(crate) fn judge_runs(runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
     Judge::default().all_of(runs.into_iter().map(|run| (run, Sender::Known)))
 }
@@ -236,7 +236,7 @@ impl Judge {
         self.followers.values_mut().chain(restarted)
     }
 
-    /// Those of one slave, if it was heard.
+    /// The followers of one slave, if it was heard.
     fn of(&mut self, address: u8) -> impl Iterator<Item = &mut Follower> {
         let restarted = self.restarted.get_mut(&address);
         let follower = self.followers.get_mut(&address);

@@ -50,7 +50,7 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
     text.insert_str(end.expect("a slave"), lines);
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
     let found = settle::<Nordac>(&source, BenchSize::Own);
-    let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
+    let (_, plan) = found.unwrap_or_else(|problems| panic!("{:#?}", problems.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     link.trace(0)

@@ -28,9 +28,9 @@ const MOST_EXCHANGES: usize = 32;
 
 /// PZD valid, OFF2 and OFF3 not active, enable, setpoint enabled, and OFF1: the drive gets ready (3.2.1).
 const READY: u16 = 0x047E;
-/// The same with ON.
+/// `READY` with ON.
 const ENABLED: u16 = 0x047F;
-/// With OFF3.
+/// `ENABLED` with OFF3.
 const QUICK_STOP: u16 = 0x047B;
 /// The states that ZSW shows in bits 6 and 3 to 0 (3.3).
 const STATE: u16 = 0x004F;

@@ -130,7 +130,7 @@ pub(crate) enum TelegramStep {
 /// Whose octets or telegrams are counted.
 #[derive(Clone, Debug)]
 pub(crate) enum Sender {
-    /// Those of all stations.
+    /// The octets or telegrams of all stations.
     Any,
     /// `master`.
     Master,
@@ -140,7 +140,7 @@ pub(crate) enum Sender {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OctetHarm {
-    /// One that says all that there is to say.
+    /// A fault that needs no value.
     Plain(LinkFault),
     /// `delay 3ms`: it leaves later, and those after it too.
     Delay(Duration),

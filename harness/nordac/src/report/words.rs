@@ -273,7 +273,7 @@ fn status(word: u16) -> String {
     in_set(words.join(", "), word)
 }
 
-/// The same with the parameter set of bits 15 and 14, where it is not the first.
+/// Adds the parameter set of bits 15 and 14, where it is not the first.
 fn in_set(text: String, word: u16) -> String {
     match word >> 14 {
         0 => text,

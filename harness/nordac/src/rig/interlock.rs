@@ -32,7 +32,7 @@ pub(crate) struct InverterInterlock {
     pub(crate) slave: u8,
     cell: Cell,
     condition: PortCondition<i64>,
-    interlock: Interlock,
+    entry: Interlock,
     every: Span,
     /// On the clock of the driver.
     pub(crate) next: Instant,
@@ -71,19 +71,19 @@ impl InverterInterlock {
             slave: interlock.drive,
             cell,
             condition,
-            interlock: interlock.clone(),
+            entry: interlock.clone(),
             every: interlock.every.span(),
             next: Instant::START,
         })
     }
 
-    /// Those of a rig's file, which was checked.
+    /// The interlocks of a rig's file, which was checked.
     fn all(rig: &Rig) -> Vec<Self> {
         let all = rig.file.interlock.iter();
         all.flat_map(Self::read).collect()
     }
 
-    /// Those that a driver has to read: on parameters.
+    /// The interlocks on parameters, which a driver has to read.
     pub(crate) fn parameters(rig: &Rig) -> Vec<Self> {
         let mut all = Self::all(rig);
         all.retain(|interlock| interlock.parameter().is_some());
@@ -104,7 +104,7 @@ impl InverterInterlock {
 
     /// Why it cannot be read.
     pub(crate) fn unread(&self, why: &str) -> Trouble {
-        let words = self.interlock.words(&self.cell.name());
+        let words = self.entry.words(&self.cell.name());
         Trouble::Lost(format!("{words} cannot be read: {why}"))
     }
 
@@ -122,16 +122,13 @@ impl InverterInterlock {
             Cell::Word(ReplyWord::Status) => format!("{:04X}", word_of(number)),
             Cell::Word(ReplyWord::Second) => number.to_string(),
         };
-        let why = self.interlock.broken(
+        let why = self.entry.broken(
             &self.condition,
             word_of(number).into(),
             &read,
             |min, max| min.is_none_or(|min| *min <= number) && max.is_none_or(|max| number <= *max),
         )?;
-        Some(format!(
-            "{}: {why}",
-            self.interlock.words(&self.cell.name())
-        ))
+        Some(format!("{}: {why}", self.entry.words(&self.cell.name())))
     }
 
     /// Why it does not hold in the inputs of an exchange; `None` if it does, or if it is on a parameter.
@@ -197,7 +194,7 @@ pub(super) struct InverterInterlocks {
 }
 
 impl InverterInterlocks {
-    /// Those of a rig with these slaves; `None` where it has none.
+    /// The interlocks of a rig with these slaves; `None` where it has none.
     pub(super) fn of(rig: &Rig, slaves: &[RigSlave], patience: Span) -> Option<Self> {
         let all = InverterInterlock::all(rig);
         (!all.is_empty()).then(|| Self {

@@ -185,7 +185,7 @@ pub(super) fn answer(
     Ok(None)
 }
 
-/// The same, as the exchange after it shows it too: a value is put back later, and a wrong slave may show the one of an earlier answer first.
+/// An answer that the next exchange repeats: a value is put back later, and a wrong slave may show the one of an earlier answer first.
 fn confirmed(slave: RigSlave, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<Pkw>, TalkError> {
     let Some(mut last) = answer(slave, talk, task)? else {
         return Ok(None);
@@ -213,7 +213,7 @@ pub(super) fn value(answer: Pkw) -> Option<u32> {
 /// What parameters read, by number and IND.
 pub(super) type Values = BTreeMap<(u16, u16), u32>;
 
-/// The same as the setup of a slave has it.
+/// Values in the form of a slave's setup.
 pub(super) fn stated(
     values: &Values,
 ) -> impl Iterator<Item = (&'static Parameter, Index, i64)> + use<'_> {

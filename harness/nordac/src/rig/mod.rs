@@ -135,10 +135,7 @@ pub(crate) fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
         let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default().number());
         format!("slave {address} ppo {ppo}\nslave {address} parameter 1621 = 2\n")
     });
-    let base = Source {
-        name: "setup".to_owned(),
-        text: lines.collect::<String>().into(),
-    };
+    let base = Source::new("setup", lines.collect::<String>());
     let mut scenario: Scenario<Nordac> = read(&base, Part::Header)?;
     let more: Scenario<Nordac> = read(source, Part::Header)?;
     scenario.header.slaves.extend(more.header.slaves);

@@ -88,7 +88,7 @@ struct ReceivedOctet {
 }
 
 impl ReceivedOctet {
-    /// The same octet, whenever it came.
+    /// A copy without its time.
     const fn at_any_time(self) -> Self {
         Self {
             sent: 0,
@@ -109,7 +109,7 @@ pub(super) type Agreement = usize;
 pub(super) const WHOLE: Agreement = Agreement::MAX;
 
 impl ReceivedOctets {
-    /// The same octets, whenever they came.
+    /// The octets without their times.
     pub(super) fn at_any_time(mut self) -> Self {
         let octets = self.0.iter_mut();
         octets.for_each(|octet| *octet = octet.at_any_time());

@@ -265,16 +265,9 @@ mod tests {
         let all = slaves(rig.port().expect("a port"));
         let text =
             "title x\nbus nordac\nslave {slave} ppo {ppo}\nstart {slave}\nexchange {slave}\n";
-        let source = Source {
-            name: format!("{CONVERSATION}tasks"),
-            text: with_slave(text, &all[0]).into(),
-        };
+        let source = Source::new(format!("{CONVERSATION}tasks"), with_slave(text, &all[0]));
         let scenario = Arc::new(RigScenario::read(&source).expect("a scenario"));
-        let setup = Setup {
-            rate: BusRate::K500,
-            slaves: vec![SlaveSetup::new(all[0].address)],
-            master: None,
-        };
+        let setup = Setup::new(BusRate::K500, vec![SlaveSetup::new(all[0].address)]);
         let limits = Limits::default();
         let mut link = guarded(Bench::new(&setup), limits, &[all[0].into()], false);
         let able = link.capabilities().to_vec();
@@ -299,10 +292,7 @@ mod tests {
                 let text = with_slave(file.contents_utf8().expect("text"), &slave);
                 let name = file.path().display().to_string();
                 assert!(!text.contains('{'), "{name}: {text}");
-                let source = Source {
-                    name,
-                    text: text.into(),
-                };
+                let source = Source::new(name, text);
                 RigScenario::read(&source).expect("a scenario");
             }
         }

@@ -193,7 +193,7 @@ fn judged(
     all.collect()
 }
 
-/// Those that explain most, all as much; none if that is no more than `so_far`.
+/// The steps that explain most, equally much; none if that is no more than `so_far`.
 fn best(so_far: Agreement, all: &[Step]) -> Vec<Step> {
     let most = all.iter().map(|step| step.agreed).max();
     let most = most.filter(|most| *most > so_far);

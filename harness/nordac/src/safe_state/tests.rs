@@ -270,7 +270,7 @@ fn a_computer_that_stands_still_accuses_no_inverter() {
     for (order, obeys) in orders.iter().flat_map(both) {
         for waits in [0, 5_000] {
             let ms = [700, 1_500, 12_000].into_iter();
-            all.extend(ms.flat_map(|ms| (1..16).map(move |at| (order, obeys, waits, ms, at))));
+            all.extend(ms.flat_map(|ms| (1..16).map(move |sent| (order, obeys, waits, ms, sent))));
         }
     }
     for (order, obeys, waits, ms, telegrams) in all {

@@ -31,7 +31,7 @@ pub(crate) struct JudgedDrives {
     pub(crate) breaches: Vec<Breach>,
     /// Frames of drives that were compared.
     pub(crate) compared: usize,
-    /// Those that could be: the same, and frames that may be of another station.
+    /// Frames that could be compared: `compared`, and those that may be of another station.
     pub(crate) replies: usize,
     /// The drives of which a frame was compared.
     pub(crate) heard: BTreeSet<u8>,
@@ -125,7 +125,7 @@ pub(crate) fn judge(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> Judg
     judge_with(heard, drives, Follower::new)
 }
 
-/// The same of drives whose identifiers are guessed from their frames.
+/// Judges drives whose identifiers are guessed from their frames.
 #[must_use]
 pub(crate) fn judge_guessed(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
     judge_with(heard, drives, Follower::guessed)

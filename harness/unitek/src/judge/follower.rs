@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, VecDeque};
 /// How much later than the slowest reply so far a reply may be, and how long a frame may be in flight.
 const PATIENCE: Span = Span::from_millis(20);
 
-/// The same where a busy computer stamps the frames.
+/// How long a reply is waited for where a busy computer stamps the frames.
 const LONG_PATIENCE: Span = Span::from_millis(1_000);
 
 /// Requests of a drive that are kept at most while they wait for their replies.
@@ -36,7 +36,7 @@ pub(super) struct PendingRequest {
     pub(super) frame: usize,
     /// Whether the drive has certainly heard it and answers it.
     pub(super) sure: bool,
-    /// The same, and a gap of the log followed it.
+    /// Whether a gap of the log followed it, and the drive had certainly heard it.
     pub(super) excused: bool,
     /// What the register could hold since the request: a drive may read it at any time until it replies.
     pub(super) held: Contents,
@@ -151,7 +151,7 @@ impl Follower {
         }
     }
 
-    /// The same for a drive of which the identifiers are guessed from its frames.
+    /// A follower of a drive whose identifiers are guessed from its frames.
     #[must_use]
     pub(crate) fn guessed(drive: u8, identifiers: (u16, u16)) -> Self {
         Self {
@@ -161,7 +161,7 @@ impl Follower {
         }
     }
 
-    /// The same for a drive on which no cycle runs, and of which a busy computer stamps the frames.
+    /// A follower of a drive on which no cycle runs, and whose frames a busy computer stamps.
     #[must_use]
     pub(crate) fn settled(drive: u8, identifiers: (u16, u16)) -> Self {
         Self {
@@ -174,7 +174,7 @@ impl Follower {
         }
     }
 
-    /// The same where the time of each frame may be off.
+    /// Adds a tolerance for the time of each frame.
     #[must_use]
     pub(crate) fn with_tolerance(self, tolerance: Span) -> Self {
         Self {
@@ -294,7 +294,7 @@ impl Follower {
         }
     }
 
-    /// The same where there may be another cause than a wrong drive: then it is in doubt.
+    /// Notes a difference as a breach, or as a doubt where `why` names another cause than a wrong drive.
     pub(super) fn differs(
         &mut self,
         frame: usize,

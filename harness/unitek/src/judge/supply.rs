@@ -60,7 +60,7 @@ impl Supply {
         self.restarted = Some(Box::new(other));
     }
 
-    /// The same after a gap of the log, which ends at `at`.
+    /// As [`Self::may_be`], after a gap of the log that ends at `at`.
     pub(super) fn has_gap(&mut self, other: Follower, breaches: usize, ended: usize, at: Instant) {
         self.may_be(other, breaches, ended);
         (self.is_gap, self.has_gaps, self.sent) = (true, true, Some(at));

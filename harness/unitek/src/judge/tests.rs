@@ -52,7 +52,7 @@ fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) 
     let text = source.text.replace(BUS, &format!("{BUS}{lines}"));
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
     let found = settle::<Unitek>(&source, BenchSize::Own);
-    let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
+    let (_, plan) = found.unwrap_or_else(|problems| panic!("{:#?}", problems.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     let mut frames = link.trace(0).channels[0].frames().to_vec();

@@ -415,7 +415,7 @@ impl RightDrive for World {
         }
     }
 
-    /// One whose events or whose way to a position depend on what is not known.
+    /// False where events or the way to a position depend on what is not known.
     fn knows(&self) -> bool {
         let mode = self.cell(0x51);
         let events = mode & u32::from(MODE_EVENT) != 0;

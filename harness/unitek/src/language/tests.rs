@@ -20,7 +20,7 @@ fn source(text: &str) -> Source {
 /// The verdict of these lines after the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
     let found = settle::<Unitek>(&source(&format!("{HEADER}{lines}")), BenchSize::Own);
-    let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
+    let (_, plan) = found.unwrap_or_else(|problems| panic!("{lines}\n{:#?}", problems.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
     let message = outcome.finding.map(|finding| finding.message);

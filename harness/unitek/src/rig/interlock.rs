@@ -107,7 +107,7 @@ struct RegisterInterlock {
     axis: Axis,
     register: &'static Register,
     condition: PortCondition<RegisterBound>,
-    interlock: Interlock,
+    entry: Interlock,
     every: Span,
     /// On a clock that is never set back.
     next: Instant,
@@ -124,24 +124,24 @@ enum Look {
 }
 
 impl RegisterInterlocks {
-    /// Those of a rig with these drives; `None` where it has none.
+    /// The interlocks of a rig with these drives; `None` where it has none.
     pub(super) fn of(rig: &Rig, axes: &[Axis], patience: Span) -> Option<Self> {
-        let entry = |interlock: &Interlock| {
+        let of_entry = |entry: &Interlock| {
             // The file was checked.
-            let (register, condition) = read(interlock).ok()?;
-            let axis = axes.iter().find(|axis| axis.node == interlock.drive)?;
+            let (register, condition) = read(entry).ok()?;
+            let axis = axes.iter().find(|axis| axis.node == entry.drive)?;
             Some(RegisterInterlock {
                 axis: *axis,
                 register,
                 condition,
-                interlock: interlock.clone(),
-                every: interlock.every.span(),
+                entry: entry.clone(),
+                every: entry.every.span(),
                 next: Instant::START,
                 scaling: None,
                 sends_itself: false,
             })
         };
-        let all: Vec<_> = rig.file.interlock.iter().filter_map(entry).collect();
+        let all: Vec<_> = rig.file.interlock.iter().filter_map(of_entry).collect();
         (!all.is_empty()).then_some(Self {
             all,
             patience,
@@ -153,13 +153,13 @@ impl RegisterInterlocks {
 impl Watch for RegisterInterlocks {
     fn due(&self) -> Option<Instant> {
         let asked = self.all.iter();
-        let asked = asked.filter(|entry| !entry.sends_itself || entry.lacks_scale());
-        asked.map(|entry| entry.next).min()
+        let asked = asked.filter(|asked| !asked.sends_itself || asked.lacks_scale());
+        asked.map(|asked| asked.next).min()
     }
 
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String> {
-        for entry in self.all.iter_mut().filter(|entry| entry.next <= now) {
-            entry.next = now + entry.every;
+        for interlock in self.all.iter_mut().filter(|due| due.next <= now) {
+            interlock.next = now + interlock.every;
             let mut asks = RegisterReader {
                 line,
                 patience: self.patience,
@@ -167,7 +167,7 @@ impl Watch for RegisterInterlocks {
                 unasked: &mut self.unasked,
             };
             // In the middle of a scenario a drive may be silent on purpose; between scenarios it must answer.
-            if let Look::Broken(why) = entry.look(&mut asks) {
+            if let Look::Broken(why) = interlock.look(&mut asks) {
                 return Err(why);
             }
         }
@@ -175,22 +175,22 @@ impl Watch for RegisterInterlocks {
     }
 
     fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), Trouble> {
-        for entry in &mut self.all {
+        for interlock in &mut self.all {
             // Nothing is under way: the way to the safe state has ended what the conversation before had begun.
-            (entry.scaling, entry.sends_itself) = (None, false);
+            (interlock.scaling, interlock.sends_itself) = (None, false);
             let mut asks = RegisterReader {
                 line,
                 patience: self.patience,
                 tries: TRIES,
                 unasked: &mut self.unasked,
             };
-            match entry.look(&mut asks) {
+            match interlock.look(&mut asks) {
                 Look::Holds => {}
                 Look::Broken(why) => return Err(Trouble::Interlock(why)),
                 Look::Silent => {
                     let why = format!(
                         "{} cannot be read: the drive does not answer",
-                        entry.interlock.words(entry.register.name)
+                        interlock.entry.words(interlock.register.name)
                     );
                     return Err(Trouble::Lost(why));
                 }
@@ -201,9 +201,9 @@ impl Watch for RegisterInterlocks {
 
     fn sent(&mut self, what: Out<'_>) {
         for frame in what.frames() {
-            for entry in &mut self.all {
-                if let Ok(request) = Request::decode(frame, entry.axis.rx, Dlc4::As3) {
-                    entry.follow(request);
+            for interlock in &mut self.all {
+                if let Ok(request) = Request::decode(frame, interlock.axis.rx, Dlc4::As3) {
+                    interlock.follow(request);
                 }
             }
         }
@@ -211,9 +211,9 @@ impl Watch for RegisterInterlocks {
 
     fn hear(&mut self, heard: &Heard) -> Result<(), String> {
         let all = self.all.iter();
-        for entry in all.filter(|entry| entry.sends_itself && !entry.lacks_scale()) {
-            if let Some(reply) = entry.reply(heard, entry.register.number)
-                && let Some(why) = entry.broken(reply)
+        for interlock in all.filter(|cyclic| cyclic.sends_itself && !cyclic.lacks_scale()) {
+            if let Some(reply) = interlock.reply(heard, interlock.register.number)
+                && let Some(why) = interlock.broken(reply)
             {
                 return Err(why);
             }
@@ -278,7 +278,6 @@ impl RegisterInterlock {
         (reply.register == register).then_some(reply)
     }
 
-    /// Why it does not hold.
     fn broken(&self, reply: Reply) -> Option<String> {
         let raw = (reply.number() & i64::from(u32::MAX)) as u32;
         let scaling = self.scaling.unwrap_or_default();
@@ -296,17 +295,12 @@ impl RegisterInterlock {
             (None, PortCondition::Bit(..)) => format!("{raw:X}"),
             (None, PortCondition::Within(..)) => self.register.number_of(raw).to_string(),
         };
-        let why = self
-            .interlock
-            .broken(&self.condition, raw, &read, |min, max| {
-                // What has no meaning is within no bounds.
-                min.is_none_or(|bound| number(bound.1).is_some_and(|is| is >= bound.0))
-                    && max.is_none_or(|bound| number(bound.1).is_some_and(|is| is <= bound.0))
-            })?;
-        Some(format!(
-            "{}: {why}",
-            self.interlock.words(self.register.name)
-        ))
+        let why = self.entry.broken(&self.condition, raw, &read, |min, max| {
+            // What has no meaning is within no bounds.
+            min.is_none_or(|bound| number(bound.1).is_some_and(|is| is >= bound.0))
+                && max.is_none_or(|bound| number(bound.1).is_some_and(|is| is <= bound.0))
+        })?;
+        Some(format!("{}: {why}", self.entry.words(self.register.name)))
     }
 }
 
@@ -320,14 +314,14 @@ struct RegisterReader<'a, 'l> {
 
 impl RegisterReader<'_, '_> {
     /// Reads a register; `None` where no reply comes.
-    fn ask(&mut self, entry: &RegisterInterlock, register: u8) -> Option<Reply> {
-        let frame = Request::Read { register }.encode(entry.axis.rx).ok()?;
+    fn ask(&mut self, interlock: &RegisterInterlock, register: u8) -> Option<Reply> {
+        let frame = Request::Read { register }.encode(interlock.axis.rx).ok()?;
         (0..self.tries).find_map(|_| {
             let sent = self.line.send(0, Out::Frames(&[frame]));
             let until = sent + self.patience;
             while self.line.trouble().is_none() {
                 while let Some((at, heard)) = self.line.receive(0) {
-                    match entry.reply(&heard, register) {
+                    match interlock.reply(&heard, register) {
                         Some(reply) => return Some(reply),
                         None => self.unasked.push((at, heard)),
                     }

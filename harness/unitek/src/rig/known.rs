@@ -131,7 +131,7 @@ impl Known {
         self.cell(0x8F) & !at_first & ERROR_TIME_OUT != 0
     }
 
-    /// The same drive with what its registers read at first.
+    /// A copy whose registers read what they read at first.
     pub(super) fn as_at_first(&self) -> Self {
         Self {
             cells: self.first.clone(),

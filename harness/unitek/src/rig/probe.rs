@@ -190,7 +190,7 @@ impl Probe<'_, '_> {
         self.send_on(self.known.axis.rx, data)
     }
 
-    /// The same on an identifier.
+    /// Sends data on an identifier, and returns when it was sent.
     fn send_on(&mut self, rx: u16, data: &[u8]) -> Result<Instant, Error> {
         let Ok(frame) = Frame::base(rx, data) else {
             return Ok(self.link.now());
@@ -362,7 +362,7 @@ impl Probe<'_, '_> {
         }
     }
 
-    /// The same where replies have 4 bytes: with bit 8 of DC for one of them.
+    /// Settles `wide-replies` where replies have 4 bytes: bit 8 of DC is set for one reply of 6.
     fn wide(&mut self) -> Result<(), Error> {
         let cells = self.known.cells.iter();
         let negative = cells.map(|(register, raw)| (*register, *raw));

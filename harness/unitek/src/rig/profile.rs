@@ -19,7 +19,7 @@ use harness_proto::unitek::properties::{Accepts, Description, Setting};
 pub(super) struct ProfileSettings(Vec<(u8, &'static Description, PropertyValue)>);
 
 impl ProfileSettings {
-    /// Those of a rig; none where its file names no profile.
+    /// The settings of a rig's profile; empty where its file names none.
     pub(super) fn of(rig: &Rig) -> Self {
         let Some(profile) = &rig.profile else {
             return Self::default();

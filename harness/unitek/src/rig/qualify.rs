@@ -58,7 +58,7 @@ enum Needs {
     MotionAndBusSettings,
     /// Identifiers may be changed, and not stored.
     BusSettings,
-    /// The same, and where that shows nothing, the drive is switched off and on.
+    /// Identifiers may be changed and, where that shows nothing, the drive is switched off and on.
     BusSettingsAndPowerUp,
     /// The drive is switched off and on.
     PowerUp,

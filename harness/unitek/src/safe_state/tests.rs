@@ -98,7 +98,7 @@ fn a_motor_that_does_not_stand_is_not_confirmed() {
 /// A computer that stands still, for longer than drives need to stand, is not taken for a drive that does not.
 #[test]
 fn a_computer_that_stands_still_accuses_no_drive() {
-    for (after, coasts) in (1..12).flat_map(|place| [(place, false), (place, true)]) {
+    for (after, coasts) in (1..12).flat_map(|after| [(after, false), (after, true)]) {
         let mut line = line(Limits::unlimited());
         send(&mut line, &["201#31FF7F"]);
         let standing = Standstill {

@@ -198,7 +198,7 @@ impl Player {
         })
     }
 
-    /// The same as [`Self::explained`], unless a slave was proven wrong before.
+    /// As [`Self::explained`], but `None` once a slave was proven wrong.
     fn excused(&mut self, scenario: &RigScenario, left: &AttemptEvidence) -> Option<String> {
         if self.proven {
             return None;

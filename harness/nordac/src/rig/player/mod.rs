@@ -381,10 +381,10 @@ impl Player {
         let came = |came: ReceivedOctets| if exact { came } else { came.at_any_time() };
         for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
             let seen = came(seen);
-            let conversed = |slaves| came(self.conversed(known, slaves, (&seen, exact)));
+            let conversed = |properties| came(self.conversed(known, properties, (&seen, exact)));
             // What a slave sends follows from parameters too, and without a parameter channel those are not known.
             let is_read = known.ppo().has_pkw();
-            match is_read.then(|| settle::settle(|slaves| conversed(slaves).agrees(&seen))) {
+            match is_read.then(|| settle::settle(|point| conversed(point).agrees(&seen))) {
                 None => {}
                 Some(Some(settled)) => (known.properties, known.open) = settled,
                 // Every value of every point stays open.

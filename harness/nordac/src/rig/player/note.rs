@@ -253,7 +253,7 @@ impl SlaveNote {
         !found.is_empty()
     }
 
-    /// The same of what came where time is real.
+    /// Whether slaves could have sent what came where time is real; `None` where the comparison stays open.
     fn could_be_sent_by(&self, other: Other, held: &Values) -> Option<bool> {
         let (rate, beats) = (self.begun.rate, &self.begun.beats);
         beats.beat();

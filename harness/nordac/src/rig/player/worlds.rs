@@ -152,7 +152,7 @@ impl Talk {
         }
     }
 
-    /// The same where times may be off by some milliseconds and a scan.
+    /// The dialogue where times may be off by some milliseconds and a scan.
     fn within(&self, millis: u64) -> Dialogue<Piece> {
         let mut talk = self.talk.clone();
         let more = Span::from_millis(millis);

@@ -87,7 +87,7 @@ enum AttemptCourse {
     /// A drive did not become ready.
     Unanswered(Error),
     Skipped(Skip),
-    /// It was played. With what the drives and their models read at rest, and the lines that the models have not met.
+    /// The outcome, what the drives and their models read at rest, and the lines that the models did not meet.
     Played(Box<Outcome>, [AtRest; 2], Vec<usize>),
 }
 
@@ -318,7 +318,8 @@ impl Player {
                     shown => self.lost_again(scenario, shown),
                 };
                 let wrong = matches!(shown, Proof::Wrong(_));
-                let outcome = self.judged(scenario, *outcome, (&told.unlike, &foretold, shown));
+                let unlike = &told.unlike;
+                let outcome = self.judged(scenario, *outcome, unlike, &foretold, shown);
                 if let Some(note) = self.notes.last_mut() {
                     note.told(told, wrong);
                 }

@@ -62,7 +62,7 @@ struct AttemptShown {
     ended: Option<(Verdict, Option<usize>)>,
     /// The frames that were received before the scenario, without what means nothing.
     before: BTreeSet<String>,
-    /// Those of the scenario: by identifier, length and register the contents, one after the other where they change.
+    /// The frames of the scenario: by identifier, length and register the contents, in order, where they change.
     within: BTreeMap<String, Vec<String>>,
 }
 

@@ -64,10 +64,7 @@ fn desk(setup: &[&str]) -> Source {
          [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n\
          allow_other_identifiers = true\n"
     );
-    Source {
-        name: "desk.toml".to_owned(),
-        text: text.into(),
-    }
+    Source::new("desk.toml", text)
 }
 
 fn bench(setup: &[&str]) -> PortRun<Player> {
@@ -157,10 +154,7 @@ fn kept(name: &str) -> Source {
         "/../../corpora/scenarios/unitek"
     );
     let text = std::fs::read_to_string(format!("{folder}/{name}.scn")).expect("a scenario");
-    Source {
-        name: name.to_owned(),
-        text: text.into(),
-    }
+    Source::new(name, text)
 }
 
 /// The firmware of the dump is that of one drive: another one is held against what it reads there itself.
@@ -224,10 +218,7 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
         ("read 1 40 = 0101", true, Verdict::Passed),
     ] {
         let text = format!("title t\nbus unitek\ndrive 1\n\n{lines}\n");
-        let source = Source {
-            name: "t".to_owned(),
-            text: text.into(),
-        };
+        let source = Source::new("t", text);
         let scenario = RigScenario::read(&source).expect("a scenario");
         let steps = scenario.plan.steps.iter();
         let unmet: Vec<_> = steps.map(|step| step.span.start).collect();
@@ -238,8 +229,9 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
             ..Outcome::rig_error(String::new())
         };
         let judged = |unlike: &[(u8, u8)]| {
-            let shown = (unlike, known, Proof::Complete);
-            player.judged(&scenario, outcome.clone(), shown).verdict
+            let outcome = outcome.clone();
+            let judged = player.judged(&scenario, outcome, unlike, known, Proof::Complete);
+            judged.verdict
         };
         assert_eq!(judged(&[]), verdict, "{lines}");
         // What a drive reads differently at rest is not compared.

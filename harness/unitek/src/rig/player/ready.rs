@@ -49,7 +49,7 @@ impl Player {
         learnt
     }
 
-    /// The same of one drive.
+    /// Reads and probes one drive.
     fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<(), Error> {
         let axes = [known.axis];
         if known.doubtful {

@@ -49,7 +49,9 @@ impl Player {
         &self,
         scenario: &RigScenario,
         outcome: Outcome,
-        (unlike, foretold, shown): (&[(u8, u8)], &[usize], Proof),
+        unlike: &[(u8, u8)],
+        foretold: &[usize],
+        shown: Proof,
     ) -> Outcome {
         let differs = |register| unlike.iter().any(|differs| differs.1 == register);
         let judged = |line: &usize| {

@@ -62,7 +62,7 @@ pub(super) struct AttemptFrames {
     pub(super) way: LinkTimes,
     /// Registers that read something else at rest than those of the model, by drive.
     pub(super) unlike: Vec<(u8, u8)>,
-    /// Those of them which a right drive may read so.
+    /// The registers among `unlike` that a right drive may read so.
     pub(super) explained: Vec<(u8, u8)>,
     pub(super) follows: bool,
 }

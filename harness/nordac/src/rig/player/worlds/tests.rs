@@ -108,7 +108,7 @@ fn stands_still(slave: &Known, text: &'static str) {
                 turn.left += pause;
                 turn.read = turn.read.map(|read| read + pause);
             }
-            let moves = |turn: &Turn| actual(&turn.came).is_some_and(|hertz| hertz != 0);
+            let moves = |turn: &Turn| actual(&turn.came).is_some_and(|value| value != 0);
             // What moves has gone on.
             let rests = place + 1 >= right.len() || !moves(&right[place + 1]);
             assert!(
