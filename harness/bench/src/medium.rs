@@ -133,7 +133,7 @@ impl Pieces {
     }
 }
 
-/// How a stream reports line errors.
+/// How a stream tells of line errors.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema, clap::ValueEnum,
 )]

@@ -100,7 +100,7 @@ pub fn in_words(path: &Path, error: io::Error) -> io::Error {
 /// Looks for a folder with the file in which a command keeps its run.
 ///
 /// # Errors
-/// Why there is none, and what to name, in a sentence.
+/// Why there is no file, and what to name, in a sentence.
 pub fn has_run(path: &Path, record: &str) -> Result<(), String> {
     let why = if let Err(error) = path.metadata() {
         match error.kind() {

@@ -57,7 +57,7 @@ pub fn gravity(played: &dyn PlayedCampaign) -> u8 {
     gravest.unwrap_or(0) + if differs { 10 } else { 0 }
 }
 
-/// A share of all cases, to a hundredth of a percent; a share that is not nothing does not look like it.
+/// A share of all cases, to a hundredth of a percent; a share above zero is not shown as zero.
 #[must_use]
 pub fn share(part: u64, all: u64) -> String {
     if all == 0 {

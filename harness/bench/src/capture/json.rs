@@ -148,7 +148,7 @@ fn read_byte(byte: &ByteObject) -> Result<LineByte, &'static str> {
     Ok(line_byte(byte.t_ns, byte.sent, byte.received, error))
 }
 
-/// A mark; one that is not known is left out.
+/// A mark; an unknown one is ignored.
 fn mark(object: &MarkObject) -> Option<Remark> {
     const KINDS: [(&str, Marks); 5] = [
         ("detected", Marks::DETECTED),

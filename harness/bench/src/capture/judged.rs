@@ -35,7 +35,7 @@ impl JudgeOptions<'_> {
     }
 }
 
-/// What came of judging a capture.
+/// The result of judging a capture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JudgedCapture {
     /// Passed, failed, or inconclusive where nothing was compared.
@@ -50,7 +50,7 @@ pub struct JudgedCapture {
     pub shown: String,
 }
 
-/// What came of judging frames or telegrams of a shared line.
+/// The result of judging frames or telegrams of a shared line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JudgedFrames {
     /// Passed, failed, or inconclusive where nothing was compared.

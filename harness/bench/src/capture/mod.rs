@@ -51,7 +51,7 @@ pub struct Capture {
     pub traces: Vec<Trace>,
     /// When the capture began and ended, if the file says so.
     pub listened: Option<CaptureSpan>,
-    /// Whether the times are those of the line: a log may have none, and then the order alone is known.
+    /// Whether the times are those of the line: of a log without times only the order is known.
     pub timed: bool,
 }
 
@@ -147,7 +147,7 @@ pub fn read_with(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Capt
     import::read(bytes, settings)
 }
 
-/// Whether a file is to be read as a capture, and not as a scenario: every file is that does not look like one.
+/// Whether to read a file as a capture and not as a scenario: any file that does not look like a scenario.
 #[must_use]
 pub fn is_capture(path: &Path) -> bool {
     let mut start = Vec::new();

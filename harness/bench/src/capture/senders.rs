@@ -170,7 +170,7 @@ fn joined(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
     cut.into_iter().map(run).collect()
 }
 
-/// Idle octet times in front of a request (T_SYN).
+/// Idle octet times before a request (T_SYN).
 const SYN_OCTETS: u64 = SYN_BITS.div_ceil(OCTET_BITS);
 
 /// The slave that owes a reply.
@@ -199,7 +199,7 @@ impl OwedReply {
 ///
 /// A port gives octets in portions, some milliseconds late, so the idle times between octets are not known. A telegram ends where its own
 /// bytes say so, and its octets count as sent one after the other, the last one when it was read. The idle time that the rules demand is
-/// kept in front of it: 33 bits before a request, 11 bits before a reply.
+/// kept before it: 33 bits before a request, 11 bits before a reply.
 #[derive(Clone, Debug)]
 pub struct TelegramCutter {
     octet: u64,

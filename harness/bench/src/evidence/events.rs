@@ -189,7 +189,7 @@ impl RecordLine {
         Span::from_units(units)
     }
 
-    /// The event of a line; `None` where it is none, or holds what cannot be.
+    /// The event of a line; `None` if it is no event or has impossible values.
     #[must_use]
     pub fn event(&self) -> Option<LinkEvent> {
         let instant = |t: &u64| Instant::START + Span::from_units(*t);

@@ -22,7 +22,7 @@ pub struct JunitCase {
     pub details: String,
     /// How long it took on the line.
     pub took: Duration,
-    /// The files that it left.
+    /// The files that it has written.
     pub attachments: Vec<String>,
 }
 

@@ -12,14 +12,14 @@ use std::io::BufRead;
 /// The largest record, in bytes.
 pub const MAX_SIZE: u64 = 1 << 31;
 
-/// The longest time of a conversation: what a damaged digit makes of one must not keep a computer busy for years.
+/// The longest time of a conversation: a damaged digit must not keep a computer busy for years.
 pub(crate) const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
 
 /// Reads a record line by line: `take` gets each one with its number, counted from 1, and its text. Returns whether the last one is whole; a
 /// run that was killed leaves half a line.
 ///
 /// # Errors
-/// The first line that is none, or that cannot stand where it does.
+/// The first line that is invalid or in the wrong place.
 pub fn read(
     record: impl BufRead,
     mut take: impl FnMut(usize, &[u8], RecordLine),

@@ -59,7 +59,7 @@ pub struct FuzzRun<C: FuzzCase> {
     progress: Progress,
     /// How often each difference was flaky, by its key; `SETTLED` for a confirmed one.
     known: BTreeMap<String, u8>,
-    /// What the drives are asked before anything is left to chance.
+    /// The queries of the drives before the first random case.
     tour: Vec<C>,
     /// How many findings count.
     confirmed: usize,

@@ -68,7 +68,7 @@ pub trait FuzzCase:
     /// The subset of a round of a run, of what the scope allows.
     fn swarm(seed: u64, round: u64, scope: &Self::Scope) -> Swarm<Self::Spice>;
 
-    /// What the drives are asked before anything is left to chance.
+    /// The queries of the drives before the first random case.
     fn tour(scope: &Self::Scope, about: &FuzzSettings<Self>) -> Vec<Self>;
 
     /// The case of a number; `tour_and_number` has the tour too. It depends on the numbers of `dice`, and on what was kept before.

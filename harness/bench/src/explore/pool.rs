@@ -97,7 +97,7 @@ pub fn hash(words: &[u32]) -> u32 {
     })
 }
 
-/// Cases in an order in which each shows as much new as any could, as long as one shows something.
+/// Cases ordered so that each adds as many new features as any could; those that add none are dropped.
 #[must_use]
 pub fn by_novelty<C>(cases: Vec<(C, Vec<u32>)>) -> Vec<C> {
     let cases = cases.into_iter();

@@ -1,4 +1,4 @@
-//! Makes a conversation of acts small: as long as the same kind of difference stays, acts are left out, and times and values are lowered.
+//! Shrinks a conversation of acts: as long as the same kind of difference remains, acts are dropped, and times and values are lowered.
 
 use super::target::Target;
 use super::{Differing as _, ExploreError, Finding, FuzzCase};
@@ -112,7 +112,7 @@ impl<C: Acts> Shrinker<'_, C> {
         self.best.acts().len()
     }
 
-    /// Leaves out acts: long runs of them first. Their time is left out too, or given to the act before them.
+    /// Drops acts, long runs of them first. Their time is dropped too, or added to the act before them.
     fn leave_out(&mut self) -> Result<(), ExploreError> {
         let mut length = self.count();
         while length > 0 {

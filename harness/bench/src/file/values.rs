@@ -18,7 +18,9 @@ const MAX_SPEED: f64 = 32_767.0;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}: {expected}")]
 pub struct ValueError {
+    /// What is wrong.
     pub message: String,
+    /// What was expected.
     pub expected: String,
 }
 
@@ -35,6 +37,7 @@ fn wrong(message: impl Into<String>, expected: impl Into<String>) -> ValueError 
 pub struct Time(pub Duration);
 
 impl Time {
+    /// A time of `seconds`.
     #[must_use]
     pub const fn seconds(seconds: u64) -> Self {
         Self(Duration::from_secs(seconds))
@@ -219,6 +222,7 @@ impl fmt::Display for Hertz {
 pub struct KilobitRate(#[schemars(range(min = 1, max = 1500))] pub f64);
 
 impl KilobitRate {
+    /// Bits a second.
     #[must_use]
     pub fn bits_per_second(self) -> u32 {
         (self.0 * 1000.0).round().clamp(0.0, f64::from(u32::MAX)) as u32
@@ -246,7 +250,9 @@ impl Serialize for KilobitRate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LinkName {
+    /// Who sends.
     pub from: Option<u8>,
+    /// Who receives.
     pub to: Option<u8>,
 }
 

@@ -1,6 +1,6 @@
 //! The protocol of socketcand, the daemon that gives a CAN interface of Linux to the network (`doc/protocol.md` of linux-can/socketcand).
 //!
-//! Messages stand between `<` and `>`, one after the other in a stream:
+//! Messages are enclosed in `<` and `>`, one after the other in a stream:
 //!
 //! ```text
 //! server  < hi >

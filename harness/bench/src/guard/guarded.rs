@@ -146,7 +146,7 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Waits up to the deadline, where that comes first. After it a caller looks again.
+    /// Waits up to the deadline, if that comes first. The caller checks again afterwards.
     fn wait_until(&mut self, until: Instant) -> bool {
         let Some(deadline) = self.deadline.filter(|_| self.trouble().is_none()) else {
             return self.inner.wait(until);

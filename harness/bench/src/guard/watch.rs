@@ -7,7 +7,7 @@ use std::fmt;
 
 /// Looks at drives while nothing is under way.
 pub trait Watch: Send + fmt::Debug {
-    /// When it wants to look next, on a clock that is never set back; `None` for never.
+    /// When it next needs to look, on a monotonic clock; `None` for never.
     fn due(&self) -> Option<Instant>;
 
     /// Looks at the drives. It sends whole telegrams only, and returns when it has received their answers.
@@ -27,7 +27,7 @@ pub trait Watch: Send + fmt::Debug {
         let _of_no_interest = what;
     }
 
-    /// Takes notice of a piece that came for the conversation.
+    /// Observes a piece that was received for the conversation.
     ///
     /// # Errors
     /// Why the conversation must not continue, in a sentence.
@@ -36,7 +36,7 @@ pub trait Watch: Send + fmt::Debug {
         Ok(())
     }
 
-    /// The pieces that came during the last look and do not answer it, with their times: the conversation gets them.
+    /// The pieces received during the last look that do not answer it, with their times. They belong to the conversation.
     fn take_unasked(&mut self) -> Vec<(Instant, Heard)> {
         Vec::new()
     }

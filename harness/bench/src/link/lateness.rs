@@ -43,7 +43,7 @@ impl Lateness {
     }
 }
 
-/// For how long a computer has stood still while a caller did nothing but use a line.
+/// For how long a computer has stalled while a caller did nothing but use a line.
 #[derive(Clone, Copy, Debug)]
 pub struct StoodStill {
     /// When the last call ended.

@@ -61,7 +61,7 @@ pub enum Capability {
     /// Line errors can be sent, and are shown at their byte.
     LineErrors,
     TwoRings,
-    /// Simulated drives: for what must not be tried on a machine.
+    /// Simulated drives, for what must not be tried on a machine.
     Simulator,
 }
 
@@ -442,7 +442,7 @@ pub trait Link: Line {
         None
     }
 
-    /// Faults whose moment never came, in words.
+    /// Faults that were never injected, in words.
     fn unused_faults(&self) -> Vec<String>;
 
     /// Empties the record of what was carried; times and counts go on. A simulated link records what comes only if `on`; a link over ports

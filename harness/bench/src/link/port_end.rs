@@ -23,7 +23,7 @@ const MOST_UNEXPLAINED: u64 = 1_000_000;
 /// Octets that may come for each octet that was sent, on any bus: a reply of PROFIBUS DP has at most 255.
 const MOST_A_REPLY: u64 = 300;
 
-/// The longest silence in front of an octet with a wrong parity bit. Drives that monitor time-outs allow 10 ms without a byte (ND21 9.9), and
+/// The longest silence before an octet with a wrong parity bit. Drives that monitor time-outs allow 10 ms without a byte (ND21 9.9), and
 /// switching the parity takes some of them.
 pub const LONGEST_SILENCE: Span = Span::from_millis(6);
 

@@ -30,7 +30,7 @@ const LEAD: Span = Span::from_millis(16);
 /// Minimum of [`Lead::near`] on a line with an adapter, which transfers bytes in blocks of a millisecond and may hold them for longer.
 const ADAPTER: Span = Span::from_millis(4);
 
-/// How late an adapter may give back what was sent: it collects octets for some 16 ms, and its computer may stand still.
+/// How late an adapter may give back what was sent: it collects octets for some 16 ms, and its computer may stall.
 const ECHO: Span = Span::from_millis(500);
 
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
@@ -39,7 +39,7 @@ pub const SLACK: Span = Span::from_millis(30);
 /// How long the bench does not look at its ports, or sleeps after the end of its wait, before that counts.
 pub const HELD_UP: Span = Span::from_millis(4);
 
-/// How long octets that an adapter or a computer has held up may keep coming after the last one that was sent.
+/// How long octets delayed by an adapter or a computer may keep arriving after the last one that was sent.
 const MOST_HELD_UP: Span = Span::from_millis(2_000);
 
 /// The longest sleep: the link checks for a request to end at least this often.
@@ -496,7 +496,7 @@ impl<A: Accounting> Pump<A> {
         due.filter(|at| now < *at + STAY).min()
     }
 
-    /// Waits for the ports, for at most `span`; returns whether something came.
+    /// Waits for the ports for at most `span`. Returns whether input arrived.
     fn listen(&mut self, span: Span) -> bool {
         let timeout = Timespec {
             tv_sec: 0,
@@ -566,7 +566,7 @@ mod tests {
         (listener, pump)
     }
 
-    /// What has come while the bench did something else came at any time since; what it waited for came when it woke up.
+    /// Input that arrived while the bench did something else may have come at any time since; input that it waited for came when it woke up.
     #[test]
     fn what_comes_while_nothing_looks_came_at_any_time() {
         let (listener, mut pump) = pump();

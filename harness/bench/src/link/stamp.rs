@@ -1,4 +1,4 @@
-//! When bytes came that were read together.
+//! Arrival times of bytes that were read together.
 
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};

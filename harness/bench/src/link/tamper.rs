@@ -19,7 +19,7 @@ pub struct Passed {
     /// The byte itself, unless it is lost.
     byte: Option<Received>,
     twice: bool,
-    /// How long the first of them is held back.
+    /// How long the first of them is delayed.
     pub delay: Span,
     /// How long the line is held at 0 in place of the byte.
     pub hold: Option<Span>,

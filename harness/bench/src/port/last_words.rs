@@ -20,7 +20,7 @@ pub struct LastWords {
     parts: Parts,
     /// How the wire codes a byte.
     code: fn(u8) -> Vec<u8>,
-    /// How long the wire is left alone before each part.
+    /// How long the wire is idle before each part.
     gap: Duration,
 }
 
@@ -50,7 +50,7 @@ impl LastWords {
         Self { code, ..self }
     }
 
-    /// The same, with the wire left alone for this time before each part: for stations that tell telegrams apart by pauses.
+    /// The same, with the wire idle for this time before each part: for stations that separate telegrams by pauses.
     pub fn after(self, gap: Duration) -> Self {
         Self { gap, ..self }
     }

@@ -172,7 +172,7 @@ pub(super) fn printed(format: Format) -> String {
 /// Opens a stream: raw, with nothing sent, and what was received before dropped.
 ///
 /// # Errors
-/// [`OpenError`]; the port is left as it was.
+/// [`OpenError`]; the port is unchanged.
 pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
     let name = settings.address.to_string();
     let plain = || match settings.marks {
@@ -211,7 +211,7 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
 /// is sent, and what was received before is dropped.
 ///
 /// # Errors
-/// [`OpenError`]; the port is left as it was.
+/// [`OpenError`]; the port is unchanged.
 pub(crate) fn open_adapter(address: &PortAddress, bits_per_second: u32) -> Result<Wire, OpenError> {
     let name = address.to_string();
     match address {

@@ -31,13 +31,13 @@ const BITS: u32 = 11;
 /// How late the bytes of a driver may be that reports too early that all were sent: a USB adapter gets them each millisecond.
 const HASTY: Duration = Duration::from_millis(2);
 
-/// How much later than it came a byte may be read: adapters collect bytes for up to 16 ms.
+/// How late after its arrival a byte may be read: adapters collect bytes for up to 16 ms.
 const LATEST: Duration = Duration::from_millis(20);
 
 /// One time that the parity of a port was switched, to send a byte with a wrong parity bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switch {
-    /// How long sending was held up.
+    /// How long sending was delayed.
     pub idle: Duration,
     /// Bytes that came meanwhile. A UART has one parity setting for both directions, so it is not known whether they came with errors.
     pub unknown: u64,
@@ -58,14 +58,14 @@ pub(super) struct Serial {
     switches_parity: bool,
     /// How long a byte takes.
     byte_time: Duration,
-    /// When what was written has left the line, at the earliest.
+    /// The earliest time at which everything written has left the line.
     free: Instant,
     /// The driver has said that all bytes have left before the line can have carried them.
     hasty: bool,
     switches: Switches,
     /// What the driver counts, if it does.
     ledger: Option<Ledger>,
-    /// Whether the driver says nothing of the rates that its chip makes, and the rate is none that every chip makes.
+    /// Whether the driver does not say which rates its chip makes, and the rate is not one of those that every chip makes.
     unproven_rate: bool,
     low_latency: Option<LowLatency>,
 }
@@ -366,7 +366,7 @@ trait ParityPort {
 /// Sends a byte with a wrong parity bit: the other parity between drained bytes, which is wrong for every byte of the line;
 /// mark and space (CMSPAR) would be right for half of them, and fewer drivers know them.
 ///
-/// Says how long the line was held up. Whatever happens, what comes next has the right parity again, or it is an error.
+/// Returns how long the line was delayed. Afterwards the parity is right again, or the result is an error.
 fn send_wrong_parity(
     port: &mut impl ParityPort,
     byte: u8,

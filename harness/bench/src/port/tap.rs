@@ -111,7 +111,7 @@ impl SilentTap {
     /// Takes what has arrived, without waiting; in order, after what is in `heard` already.
     ///
     /// # Errors
-    /// The port cannot be read and is not merely gone.
+    /// The port cannot be read, for another reason than that it was lost.
     pub fn read(&mut self, heard: &mut Vec<Received>) -> io::Result<TapState> {
         let before = heard.len();
         let state = self.read_all(heard)?;

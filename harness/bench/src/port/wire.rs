@@ -15,10 +15,10 @@ use std::io::ErrorKind;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::time::Instant;
 
-/// What is read from the operating system at a time: a line brings few bytes between two looks at it.
+/// How much is read from the operating system at a time: few bytes arrive between two polls.
 const CHUNK: usize = 256;
 
-/// How often the operating system is asked in one look: a peer that sends faster than it is read must not keep the caller.
+/// How often the operating system is asked in one poll: a peer that sends faster than it is read must not block the caller.
 const MOST_CHUNKS: usize = 1_024;
 
 /// What may wait to be taken by the operating system.
@@ -364,7 +364,7 @@ impl Wire {
     ///
     /// # Errors
     /// [`Trouble::Lost`] where the port is gone or the other end has closed the connection,
-    /// [`Trouble::Garbled`] where what came is not coded as it must be. What came before is in `into`.
+    /// [`Trouble::Garbled`] if the input is not coded as required. The input before it is in `into`.
     pub fn receive(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
         into.append(&mut self.early);
         self.read_all(into)

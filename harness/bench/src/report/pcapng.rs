@@ -22,7 +22,7 @@ use harness_sim::record::{Channel, Trace};
 use std::io::Write;
 
 pub const LINK_TYPE: u16 = 250;
-/// The length of the header in front of a byte.
+/// The length of the header before a byte.
 pub const HEADER: usize = 12;
 /// The types of blocks.
 pub(crate) const SECTION: u32 = 0x0A0D_0D0A;
@@ -60,7 +60,7 @@ pub(super) fn event_of(error: LineError) -> u8 {
     row.map_or(RECEIVED, |(_, event)| *event)
 }
 
-/// The error that an event stands for.
+/// The error of an event.
 pub(crate) fn error_of(event: u8) -> Option<LineError> {
     let row = ERRORS.iter().find(|(_, known)| *known == event);
     row.map(|(error, _)| *error)

@@ -20,11 +20,11 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 pub const LINK_TYPE: u16 = 227;
-/// The length of the header in front of the data.
+/// The length of the header before the data.
 pub const HEADER: usize = 8;
 /// The comment of a frame that no station has got.
 pub(crate) const LOST: &str = "lost";
-/// The name of the interface of the bench's own frames, and what stands in front of a drive's number.
+/// The name of the interface of the bench's own frames, and the prefix of a drive's number.
 pub const MASTER: &str = "master";
 pub const DRIVE: &str = "drive ";
 
@@ -67,7 +67,7 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     out.flush()
 }
 
-/// The rate at which a frame lasts as long as this one.
+/// The rate at which this frame has its duration.
 pub fn rate_of(frame: &LineFrame) -> Option<BitRate> {
     let lasted = frame.at.since(frame.start).units();
     let bits = frame.frame.wire_bits();

@@ -8,7 +8,7 @@
 //!
 //! The header is that of [`super::pcapng`]. The events are `DATA_TX_END` for a good telegram of the master, `DATA_RX_END` for one of a slave, and the
 //! event of the first line error in a damaged one; `CAPTURE_DATA_LOST`, without octets, where nothing arrived. An octet lasts 11 bits, and there is no
-//! gap between octets. What differs from that stands in a comment, with the number of the octet counted from 1: `byte 3 parity`, `byte 3 sent 12`,
+//! gap between octets. What differs is in a comment, with the number of the octet counted from 1: `byte 3 parity`, `byte 3 sent 12`,
 //! `byte 3 sent nothing`, `byte 3 lost` for an octet that did not arrive, and `byte 3 after 50000 ns` for the time from the end of the octet before it.
 //! So nothing of the octets of a trace is lost, and [`crate::capture`] reads them back.
 
@@ -25,7 +25,7 @@ use std::io::Write;
 /// The events of the last octet of a telegram that the master sent, and that it received.
 const SENT: u8 = 0x03;
 pub const RECEIVED: u8 = 0x04;
-/// The name of the interface of the master, and what stands in front of a slave's address.
+/// The name of the interface of the master, and the prefix of a slave's address.
 const MASTER: &str = "master";
 const SLAVE: &str = "slave ";
 /// The most octets of a packet: what a station sends without a pause is cut after them.
@@ -136,7 +136,7 @@ fn near(one: Span, other: Span) -> bool {
     one.max(other).saturating_sub(one.min(other)) <= NEAR
 }
 
-/// The station that the name of an interface stands for: `Some(None)` is the master. `None` for other names.
+/// The station with this name of an interface: `Some(None)` is the master. `None` for other names.
 pub fn station(name: &str) -> Option<Option<u8>> {
     match name.strip_prefix(SLAVE) {
         Some(address) => address.parse().ok().map(Some),
@@ -190,7 +190,7 @@ pub struct PacketOctet {
 }
 
 /// Whether the time of a packet with this event is that of its first octet; `None` where the event says nothing of it. Programs of others
-/// write any event in front of good octets.
+/// write any event with good octets.
 pub fn time_of(event: u8) -> Option<bool> {
     (error_of(event).is_none() && event != LOST).then_some(![SENT, RECEIVED].contains(&event))
 }

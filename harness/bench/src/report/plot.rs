@@ -21,7 +21,7 @@ const WIDTH: usize = 100;
 /// Rows of the curve at most: with the heading, the axis and the times a plot has 20.
 const ROWS: usize = 17;
 
-/// Changes shown at most; of a longer table the middle is left out.
+/// Maximum number of changes shown; the middle of a longer table is omitted.
 const CHANGES: usize = 60;
 
 /// A record as text; empty if nothing was seen.

@@ -1,4 +1,4 @@
-//! Numbers and times that stand outside a scenario, on a command line: in the same words.
+//! Numbers and times on a command line, written as in a scenario.
 
 use super::problem::Problem;
 use super::quantity::{self, Dimension, Quantity};

@@ -193,7 +193,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         let _nothing_to_note = (state, port, all);
     }
 
-    /// What is wanted, given what came before it in the same line.
+    /// The piece to expect, given those received before it for the same line.
     fn resolve(wanted: &Self::Wanted, before: &[(Instant, Self::Received)]) -> Self::Wanted {
         let _known = before;
         wanted.clone()
@@ -220,7 +220,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         None
     }
 
-    /// When the bus wants to look at something next.
+    /// When the bus next needs a look.
     fn next_look(state: &Self::State) -> Instant {
         let _never = state;
         Instant::NEVER

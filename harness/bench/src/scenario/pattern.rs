@@ -213,7 +213,7 @@ fn low_byte(number: &Located, scope: Scope) -> Result<u8, Problem> {
     Ok(low)
 }
 
-/// Reads bytes up to the end of the line or to something that is none.
+/// Reads bytes up to the end of the line or to anything else.
 pub fn pattern(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
     let here = scanner.here();
     let items = items(scanner, 0)?;

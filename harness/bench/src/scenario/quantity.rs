@@ -382,7 +382,7 @@ pub fn plus_minus(scanner: &mut Scanner<'_>) -> bool {
     scanner.eat("+-") || scanner.eat("±")
 }
 
-/// A number with a sign and a point: its digits, and how many of them stand after the point.
+/// A number with a sign and a point: its digits, and how many of them follow the point.
 fn number(scanner: &mut Scanner<'_>) -> Result<(i64, u32), Problem> {
     let start = scanner.here();
     let negative = scanner.eat("-");

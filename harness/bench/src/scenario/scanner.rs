@@ -41,13 +41,13 @@ impl<'a> Scanner<'a> {
         self.at == self.text.len()
     }
 
-    /// What is left, white space in front taken away.
+    /// The rest of the line without leading white space.
     pub fn rest(&mut self) -> &'a str {
         self.skip_space();
         &self.text[self.at..]
     }
 
-    /// What is left, white space in front included.
+    /// The rest of the line with leading white space.
     pub fn tight(&self) -> &'a str {
         &self.text[self.at..]
     }

@@ -16,7 +16,7 @@ const MAX_DECIMALS: usize = 9;
 pub struct Duration {
     /// The digits without their point.
     digits: u64,
-    /// How many of them stand after the point.
+    /// How many of them follow the point.
     decimals: u32,
     unit: Unit,
     span: TextSpan,
@@ -100,7 +100,7 @@ impl Duration {
 }
 
 impl fmt::Display for Duration {
-    /// As the language writes it: every digit, and no space in front of the unit.
+    /// As the language writes it: every digit, and no space before the unit.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let decimals = self.decimals as usize;
         let digits = format!("{:0>width$}", self.digits, width = decimals + 1);

@@ -12,7 +12,7 @@ use system::{acknowledge, receive};
 #[derive(Debug)]
 pub(super) struct Client {
     stream: TcpStream,
-    /// When nothing was left to read for the last time: whatever is read next arrived later.
+    /// When the input was last empty: what is read next arrived later.
     empty: Instant,
 }
 

@@ -32,7 +32,7 @@ impl Clock {
         self.at(time::Instant::now())
     }
 
-    /// When bytes that arrived here `ago` left the client.
+    /// When the client sent bytes that arrived here `ago`.
     pub(super) fn left(&self, ago: Span) -> Instant {
         self.sent(time::Instant::now(), ago)
     }

@@ -24,7 +24,7 @@ pub trait ServedBus {
     /// Takes octets of a client's stream.
     ///
     /// # Errors
-    /// The first octet that is no mark where one must stand; it is dropped, and the others are taken.
+    /// The first octet that is no mark where one is required; it is dropped, and the others are taken.
     fn receive(&mut self, seat: usize, octets: &[u8]) -> Result<(), BadMark>;
     /// Lets time pass up to the clock's time `clock`.
     fn advance(&mut self, clock: Instant);

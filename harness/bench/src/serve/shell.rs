@@ -35,7 +35,7 @@ pub struct ServeOptions<P> {
     pub page: Option<String>,
     /// Whether sockets may listen at addresses that other machines reach.
     pub allow_remote: bool,
-    /// Whether the end comes when the clients have gone.
+    /// Whether serving ends when the clients have disconnected.
     pub once: bool,
     /// How long to serve; `None` until a signal arrives.
     pub length: Option<Span>,
@@ -61,7 +61,7 @@ pub enum ServeEnd {
     /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP; or the drop of the handle.
     Interrupted,
     TimeOver,
-    /// The clients have gone, and only they were waited for.
+    /// The clients have disconnected, and serving was to end with them.
     ClientsGone,
 }
 
@@ -244,7 +244,7 @@ struct Shell<'a> {
     ending: EndRequest,
     clock: Clock,
     here: usize,
-    /// A client was there, and none is left.
+    /// Whether clients were connected and all have disconnected.
     gone: bool,
     /// Whether each seat's client has sent wrong marks; reported once per client.
     garbled: Vec<bool>,

@@ -82,7 +82,7 @@ impl Tcp {
         self.listener.accept().collect()
     }
 
-    /// Takes the client in. There is none.
+    /// Accepts a client; there must be none.
     pub(super) fn seat(&mut self, client: Client) {
         self.client = Some(client);
     }

@@ -71,9 +71,9 @@ pub struct TablePart {
     pub rows: Option<Range<usize>>,
     /// The row to point at, counted from 0; what the master received there is shown in brackets.
     pub pointed: Option<usize>,
-    /// Rows shown at most; of a longer table the middle is left out.
+    /// Maximum number of rows; the middle of a longer table is omitted.
     pub at_most: Option<usize>,
-    /// Columns shown at most; of a wider table the middle is left out.
+    /// Maximum number of columns; the middle of a wider table is omitted.
     pub columns_at_most: Option<usize>,
 }
 

@@ -167,7 +167,7 @@ fn row(
     });
 }
 
-/// What the scenario expects, line by line, and whether it came; false where it expects nothing.
+/// What the scenario expects, line by line, and whether it was received. Returns false if it expects nothing.
 fn expectations(html: &mut Html, played: &ScenarioView<'_>) -> bool {
     let mut start = 0;
     let mut rows = Vec::new();
@@ -214,7 +214,7 @@ fn expectations(html: &mut Html, played: &ScenarioView<'_>) -> bool {
     true
 }
 
-/// Whether the bytes expected by a line came: playing stops at the first difference.
+/// Whether the bytes expected by a line were received: playing stops at the first difference.
 fn came(outcome: &Outcome, start: usize, end: usize) -> (&'static str, &'static str) {
     let known = outcome.finding.as_ref().map(|found| &found.span);
     match (outcome.verdict, known) {

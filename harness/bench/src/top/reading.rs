@@ -26,7 +26,7 @@ pub struct TopColumn {
     pub head: &'static str,
     /// Its least width, in characters.
     pub width: usize,
-    /// Whether it has words, which begin at its left end, and no numbers.
+    /// Whether it has words, aligned left, and not numbers.
     pub has_words: bool,
 }
 
@@ -80,7 +80,7 @@ pub struct TopEvent {
 pub struct Snapshot {
     /// How long the view has been on.
     pub at: Span,
-    /// What was read of each part of the heading. Lines of a part that the heading does not have stand at the end.
+    /// What was read of each part of the heading. Lines of a part that the heading does not have come last.
     pub parts: Vec<Vec<HeadLine>>,
     /// The drives that have been read, by their places on the bench.
     pub drives: BTreeMap<usize, TopRow>,
@@ -139,7 +139,7 @@ impl HeadLine {
 }
 
 impl Snapshot {
-    /// Notes at [`Self::at`] that something was disturbed, or came to nothing.
+    /// Notes at [`Self::at`] that something was disturbed or failed.
     pub fn disturbed(&mut self, what: String) {
         self.happened(what, true);
     }

@@ -3,7 +3,7 @@
 use super::reading::{Heading, Snapshot, TopEvent, TopRow};
 use harness_proto::time::Span;
 
-/// In which order drives stand.
+/// The order of drives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sort {
     /// By their places on the bench.

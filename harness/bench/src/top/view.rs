@@ -23,7 +23,7 @@ const LEAST_ROWS: usize = 4;
 const KEYS: &str = "  q quit  x stop  / filter  s sort  p pause  ? help";
 const FEW_KEYS: &str = "  q quit  ? help";
 
-/// What a line looks like.
+/// The appearance of a line.
 #[derive(Clone, Copy)]
 enum Face {
     Plain,

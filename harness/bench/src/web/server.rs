@@ -23,7 +23,7 @@ const MAX_CONNECTIONS: usize = 64;
 const MAX_ORDERS: usize = 16;
 /// The patience with clients.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How often a stream without events has a comment: a client that has left shows by it.
+/// How often an idle stream sends a comment, by which a disconnected client is noticed.
 const ALIVE: Duration = Duration::from_secs(3);
 /// How long the bench may take for an order.
 const ORDER: Duration = Duration::from_secs(5);

@@ -25,7 +25,7 @@ pub struct LiveScene {
     pub faults: Vec<&'static str>,
     /// What the bench can play by itself, in words.
     pub scripts: Vec<String>,
-    /// Why the page can only look on, if that is so.
+    /// Why the page is read-only, if it is.
     pub read_only: Option<String>,
 }
 
@@ -36,7 +36,7 @@ pub struct LivePicture {
     /// How it is read, in some sentences.
     pub note: &'static str,
     pub columns: Vec<String>,
-    /// What a row of its own would stand for, where rows are [folded](LiveRow::fold): one, and many.
+    /// What a row represents where rows are [folded](LiveRow::fold): singular and plural.
     pub folded: [&'static str; 2],
     /// The classes of cells and what they mean.
     pub legend: Vec<(char, &'static str)>,
@@ -70,7 +70,7 @@ pub struct LiveNews {
     pub traffic: Vec<Vec<String>>,
     /// The newest rows of the picture, at most [`MAX_ROWS`].
     pub rows: Vec<LiveRow>,
-    /// Rows before them that are left out.
+    /// Number of rows before them that are omitted.
     pub left_out: u64,
     /// What a reader of the bus concludes, in sentences.
     pub notes: Vec<String>,
@@ -84,7 +84,7 @@ pub struct LiveRow {
     pub cells: Vec<LiveCell>,
     /// What it means; may be empty.
     pub words: String,
-    /// How many rows it stands for in which always the same happens, said by `words`; 0 for a row of its own. Their cells are not drawn.
+    /// Number of equal rows that it represents, described by `words`; 0 for a single row. Their cells are not drawn.
     pub fold: u64,
 }
 

@@ -439,7 +439,7 @@ pub(super) fn read_files(
     }
 }
 
-/// What a file that is not read looks like.
+/// The error for a file that is not read: what it looks like.
 fn foreign(bytes: &[u8]) -> CaptureError {
     let known = FOREIGN.iter().find(|(magic, _)| bytes.starts_with(magic));
     let line = table::first_line(bytes).trim();

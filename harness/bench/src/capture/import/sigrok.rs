@@ -1,6 +1,6 @@
 //! Tables of samples by sigrok: a row a sample, without times.
 //!
-//! The names of channels stand in a comment, the rate in a comment (`; Samplerate: 1 MHz`) or in a line `META samplerate: 1000000`, or
+//! The names of channels are in a comment, the rate in a comment (`; Samplerate: 1 MHz`) or in a line `META samplerate: 1000000`, or
 //! nowhere. sigrok's own reader takes the rows of other programs for samples at equal times, so such tables are not to go through it.
 
 use super::super::CaptureError;
@@ -33,7 +33,7 @@ struct Samples<'b> {
 /// The levels of channels; `rate` is how many samples a second there are, where the user says it.
 ///
 /// # Errors
-/// There is no rate, equal rows were left out, or a row cannot be.
+/// There is no rate, equal rows were omitted, or a row is impossible.
 pub(super) fn read(
     bytes: &[u8],
     rate: Option<u64>,

@@ -76,7 +76,7 @@ impl<'b> Table<'b> {
     /// Where a column is, by its name.
     ///
     /// # Errors
-    /// There is none of that name.
+    /// There is no column of that name.
     pub(super) fn column(&self, name: &str) -> Result<usize, CaptureError> {
         self.find(name).ok_or_else(|| CaptureError::Link {
             place: "line 1".to_owned(),

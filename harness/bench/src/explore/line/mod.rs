@@ -2,7 +2,7 @@
 //!
 //! A bus implements [`LineBus`]: what can happen in a conversation, how it is played on simulated drives, and how two pieces of what they sent
 //! differ. Conversations, their generator, the oracle, the target of simulated drives and the scenario of a finding are made of that here.
-//! What a manual leaves open is not held against a drive: a conversation differs only if no value of any open point explains it.
+//! The open points of a manual do not accuse a drive: a conversation differs only if no values of them explain it.
 
 pub mod fuzz_case;
 pub mod generate;

@@ -107,7 +107,7 @@ impl<B: LineBus> LineTalk<B> {
             && self.acts.iter().all(fits)
     }
 
-    /// Leaves out the end, so that it is within the bounds of a conversation; `room` acts are left free.
+    /// Drops acts at the end, so that it is within the bounds of a conversation with room for `room` more acts.
     pub fn cut(&mut self, room: usize) {
         self.acts.truncate(MOST_ACTS.saturating_sub(room));
         while !self.is_bounded() && self.acts.pop().is_some() {}

@@ -377,7 +377,7 @@ mod tests {
         assert_eq!(flags[0], Event::Overrun);
     }
 
-    /// A buffer that has run over while the computer stood still leaves a line without its middle, and the next one is whole.
+    /// A buffer that overflows while the computer stalls leaves a line without its middle; the next one is complete.
     #[test]
     fn a_damaged_line_is_lost_and_several_end_the_conversation() {
         let mut adapter = Adapter::Slcan(Slcan::new(false, true, false));

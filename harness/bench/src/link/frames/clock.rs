@@ -24,7 +24,7 @@ struct LastStamp {
     read: Instant,
     /// The adapter's time, with whole periods.
     stamp: Span,
-    /// The bench's time at which the adapter's was 0, at the latest; it can lie in front of the bench's own start.
+    /// The bench's time at which the adapter's was 0, at the latest; it can be before the bench's own start.
     zero: i128,
 }
 

@@ -22,7 +22,7 @@ pub const MAX_CURVES: usize = 16;
 
 /// Samples up to which each of a curve has a mark.
 const MARKED: usize = 300;
-/// Round numbers on an axis at most; those along every second one is left out of a narrow window.
+/// Maximum number of ticks of an axis; a narrow window omits every second one of the horizontal axis.
 const ALONG: usize = 10;
 const UPWARDS: usize = 5;
 
@@ -65,7 +65,7 @@ struct CurveData<'c> {
 /// Curves over the same times.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Chart<'c> {
-    /// In front of the names of its parts, where several stand in one page: letters, digits and `-`.
+    /// The prefix of the ids of its parts, unique in a page: letters, digits and `-`.
     pub id: &'c str,
     pub title: &'c str,
     /// From when its times count, and what else must be known to read it; may be empty.
@@ -176,7 +176,7 @@ impl Chart<'_> {
         });
     }
 
-    /// A page of its own, with what stands below it.
+    /// A page with the chart and the contents below it.
     pub fn page(&self, below: &Html) -> String {
         let mut front = Html::new();
         self.draw(&mut front);
@@ -349,7 +349,7 @@ impl Chart<'_> {
         });
     }
 
-    /// The times below the last panel. In a narrow window every second one is left out.
+    /// The times below the last panel. A narrow window omits every second one.
     fn times(&self, html: &mut Html, bottom: f64) {
         let ends = self.ends();
         let (unit, per) = self.along.unit(ends);

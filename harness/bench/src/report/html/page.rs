@@ -13,13 +13,13 @@ const STYLE: &str = concat!(
 /// What the page does when it is pointed at.
 const SCRIPT: &str = include_str!("script.js");
 
-/// A part of a section that is left out where the page would become too long.
+/// A part of a section that is omitted if the page would become too long.
 #[derive(Clone, Debug)]
 pub struct FoldedPart {
     pub heading: String,
     /// The contents below it.
     pub html: Html,
-    /// What shows the same, in a sentence, where it is left out.
+    /// What shows the same, in a sentence, if it is omitted.
     pub instead: String,
 }
 

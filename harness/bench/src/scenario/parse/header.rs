@@ -45,7 +45,7 @@ pub fn bus(source: &Source) -> BusName {
     known.map_or(BusName::DEFAULT, |(_, bus)| *bus)
 }
 
-/// Reads one line as a step, whatever stands before it.
+/// Reads one line as a step, whatever precedes it.
 ///
 /// # Errors
 /// The line is no step.
@@ -267,7 +267,7 @@ fn broken_loop<L: Language>(steps: &[Step<L>]) -> Option<Problem> {
     Some(problem.help("the lines up to `end` are played for each number"))
 }
 
-/// Keeps the value of a line that may stand once.
+/// Keeps the value of a line that may occur once.
 ///
 /// # Errors
 /// It is given twice.

@@ -79,7 +79,7 @@ pub struct PlannedStep<L: Language> {
     pub span: TextSpan,
 }
 
-/// A time in front of a step.
+/// The time of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlannedWhen {
     /// None.

@@ -16,7 +16,7 @@ struct Loop {
     body: usize,
     now: i64,
     to: i64,
-    /// What the counter stood for outside.
+    /// The value of the counter outside the loop.
     outside: Option<i64>,
 }
 

@@ -22,7 +22,7 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// The first thing that was not as a step says; playing stops there.
     pub finding: Option<Mismatch>,
-    /// Where the steps begin that were not as they say, where playing has gone on after the first one.
+    /// Where the unmet steps begin, if playing continued after the first one.
     pub unmet: Vec<usize>,
     /// Notes, also when nothing failed.
     pub remarks: Vec<String>,
@@ -42,7 +42,7 @@ pub struct Outcome {
 /// [outcome](Outcome) says which drive and which cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unready {
-    /// It gave no right answer. Where time is real, a computer that stood still may be the cause.
+    /// It gave no right answer. Where time is real, a computer that stalled may be the cause.
     NoAnswer,
     /// A cell does not hold what was written to it.
     Differs,
@@ -172,13 +172,13 @@ pub struct ByteDifference {
     pub ring: usize,
     /// Which byte that the master received, counted from 1.
     pub byte: usize,
-    /// When it was received; none where it never came.
+    /// When it was received; `None` if it never was.
     pub at: Option<time::Instant>,
     /// Which byte of the line, counted from 0.
     pub index: usize,
     /// What the line says.
     pub expected: Vec<Expected>,
-    /// What was received, as far as it came.
+    /// What was received, as far as anything was.
     pub received: Vec<Received>,
 }
 

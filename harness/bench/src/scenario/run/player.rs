@@ -302,7 +302,7 @@ impl<L: Language> Runner<'_, L> {
         }
     }
 
-    /// What no line has asked for is none of the next line's business.
+    /// Drops input that no line expects, so that the next line does not see it.
     pub fn forget(&mut self, port: usize) {
         self.ports[port].next = self.ports[port].received.len();
     }

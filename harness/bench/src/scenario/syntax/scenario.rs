@@ -98,7 +98,7 @@ impl<L: Language> From<Action<L>> for Step<L> {
     }
 }
 
-/// A time in front of a step.
+/// The time of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
     /// None: as soon as the line before is done.

@@ -108,7 +108,7 @@ struct Shell<'a, B> {
     ending: EndRequest,
     clock: Clock,
     here: usize,
-    /// A client was there, and none is left.
+    /// Whether clients were connected and all have disconnected.
     gone: bool,
 }
 
