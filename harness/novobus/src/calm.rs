@@ -47,7 +47,7 @@ mod tests {
         assert_eq!(flags(&good(&right)), "........");
     }
 
-    /// ND21 9.8: up to the check sequence behind 17 zeros.
+    /// ND21 9.8: up to the check sequence after 17 zeros.
     #[test]
     fn a_check_sequence_ends_it() {
         let mut sent = good(&[0x80, 0x08]);

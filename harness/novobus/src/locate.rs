@@ -48,7 +48,7 @@ pub(crate) fn locate(received: &[Received], drives: u8) -> Option<Location> {
         return None;
     }
     // The addresses climb where a drive further down is done with its 17 zeros before the others: the addressed one is, as it
-    // notices the first zero at once (9.7), and so are those behind a time-out: 00 00 01 02 02 (9.9).
+    // notices the first zero at once (9.7), and so are those after a time-out: 00 00 01 02 02 (9.9).
     let mut before = &received[..received.len() - repeats];
     let mut lowest = last.byte;
     while let [rest @ .., byte] = before
@@ -59,7 +59,7 @@ pub(crate) fn locate(received: &[Received], drives: u8) -> Option<Location> {
         before = rest;
     }
     let zeros = before.iter().rev().take_while(|byte| byte.is(0)).count();
-    // SYNCO behind the seven zeros of a telegram is no address, although some rings have a drive 128.
+    // SYNCO after the seven zeros of a telegram is no address, although some rings have a drive 128.
     let fewest = if last.byte == SYNCO { ZEROS + 1 } else { ZEROS };
     (zeros >= fewest).then_some(Location {
         drive: last.byte,

@@ -78,7 +78,7 @@ impl SentBytes<'_> {
         unchanged.then_some(section)
     }
 
-    /// Whether a byte stands behind the sync byte of a telegram with a short address (9.2).
+    /// Whether a byte stands after the sync byte of a telegram with a short address (9.2).
     pub(crate) fn is_short(self, index: usize) -> bool {
         let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync);
         let header = start.map(|start| (start, SyncByte::decode(self.bytes[start].0)));
@@ -234,7 +234,7 @@ mod tests {
                 exchange.expect("a drive").bytes
             });
             let mut bytes: Vec<_> = bytes.map(|byte| (byte, true)).collect();
-            // The checking byte of WriteIO stands behind a sync byte, an address byte, the command and its code.
+            // The checking byte of WriteIO stands after a sync byte, an address byte, the command and its code.
             bytes[4].0 += spoilt;
             let sent = SentBytes {
                 roles: &roles(RingSize::new(3).expect("a ring"), &bytes),

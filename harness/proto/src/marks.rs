@@ -44,7 +44,7 @@ impl Marked {
     }
 }
 
-/// A byte that cannot stand behind an FF: the other end does not mark, or bytes were lost in between.
+/// A byte that cannot stand after an FF: the other end does not mark, or bytes were lost in between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadMark {
     /// The byte.

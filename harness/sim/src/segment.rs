@@ -354,7 +354,7 @@ impl<S: Station> Segment<S> {
                 (frame.bits_to_acknowledge(), Some(CanError::ErrorFrame))
             }
             (None, fault) if alone || fault == Some(FrameFault::NoAcknowledge) => {
-                // The error flag begins behind the acknowledge slot, in place of its delimiter.
+                // The error flag begins after the acknowledge slot, in place of its delimiter.
                 (
                     frame.bits_to_acknowledge() - 1,
                     Some(CanError::NoAcknowledge),
@@ -530,7 +530,7 @@ impl Host {
         }
     }
 
-    /// Puts a frame behind the others, to be sent from `at` on. A listener sends nothing.
+    /// Puts a frame after the others, to be sent from `at` on. A listener sends nothing.
     pub fn send(&mut self, at: Instant, frame: Frame) {
         if !self.silent {
             self.queue.push_back((at, frame));

@@ -65,14 +65,14 @@ impl ByDriver {
             answers: Vec::new(),
             sent: Vec::new(),
         };
-        let mut link = Spied {
+        let mut link = RecordingLink {
             link: start,
             sound: Some(by_driver.sound.clone()),
             sent: Vec::new(),
             quiet: false,
         };
         let mut before = Vec::new();
-        let note = |link: &Spied, answers: &[_]| {
+        let note = |link: &RecordingLink, answers: &[_]| {
             before.push(Before {
                 link: link.link.clone(),
                 sent: link.sent.len() as u64,
@@ -111,7 +111,7 @@ impl ByDriver {
         let Some(before) = self.before.get(step) else {
             return CaseEvidence::default();
         };
-        let mut link = Spied {
+        let mut link = RecordingLink {
             link: before.link.clone(),
             sound: None,
             sent: Vec::new(),
@@ -131,10 +131,10 @@ impl ByDriver {
     /// Plays the steps from `from` on, before which the jobs have brought `answers`; `before` is called before each of them.
     fn play_on(
         &self,
-        link: &mut Spied,
+        link: &mut RecordingLink,
         from: usize,
         mut answers: Vec<Option<u32>>,
-        mut before: impl FnMut(&Spied, &[Option<u32>]),
+        mut before: impl FnMut(&RecordingLink, &[Option<u32>]),
     ) -> (CaseEvidence, Vec<Option<u32>>) {
         let mut evidence = CaseEvidence {
             confirmed: true,
@@ -177,7 +177,7 @@ impl ByDriver {
     /// One step of the scenario, played as the scenario's player does.
     fn step(
         &self,
-        link: &mut Spied,
+        link: &mut RecordingLink,
         calls: &[(u8, PlannedCall)],
         evidence: &mut CaseEvidence,
         answers: &mut Vec<Option<u32>>,
@@ -242,7 +242,7 @@ fn settle(link: &mut SimulatedLink) {
 }
 
 /// A link that keeps what the master sends and notes what drives hold.
-struct Spied {
+struct RecordingLink {
     link: SimulatedLink,
     sound: Option<Sound>,
     sent: Vec<u8>,
@@ -250,7 +250,7 @@ struct Spied {
     quiet: bool,
 }
 
-impl Line for Spied {
+impl Line for RecordingLink {
     fn medium(&self, port: usize) -> Medium {
         self.link.medium(port)
     }

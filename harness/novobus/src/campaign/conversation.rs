@@ -105,7 +105,7 @@ pub(crate) struct Answers {
     restarts: Vec<usize>,
 }
 
-/// Where telegrams begin, counted from 1, and the byte behind the last one.
+/// Where telegrams begin, counted from 1, and the byte after the last one.
 #[must_use]
 pub(crate) fn telegrams(bytes: &[u8]) -> Vec<u64> {
     let mut starts = Vec::new();

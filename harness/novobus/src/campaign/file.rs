@@ -245,7 +245,7 @@ pub(crate) fn schema() -> serde_json::Value {
 
 /// A campaign file's text, read and not yet settled for a ring.
 #[derive(Debug)]
-pub(crate) struct Read<'a> {
+pub(crate) struct CampaignText<'a> {
     /// What it says.
     pub file: CampaignFile,
     table: Spanned<DeTable<'a>>,
@@ -256,7 +256,7 @@ pub(crate) struct Read<'a> {
 ///
 /// # Errors
 /// All its mistakes, each with its place.
-pub(crate) fn read(source: &Source) -> Result<Read<'_>, Problems> {
+pub(crate) fn read(source: &Source) -> Result<CampaignText<'_>, Problems> {
     let problems = |mut all: Vec<Problem>| {
         all.sort_by_key(|problem| (problem.span.start, problem.span.end));
         all.dedup();
@@ -268,7 +268,7 @@ pub(crate) fn read(source: &Source) -> Result<Read<'_>, Problems> {
         return Err(problems(mistakes));
     }
     let file = toml::from_str(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
-    let read = Read {
+    let read = CampaignText {
         file,
         table,
         source,
@@ -281,7 +281,7 @@ pub(crate) fn read(source: &Source) -> Result<Read<'_>, Problems> {
     }
 }
 
-impl Read<'_> {
+impl CampaignText<'_> {
     /// A mistake at a key of the file.
     pub(crate) fn wrong(
         &self,

@@ -4,7 +4,7 @@ use super::fault::CaseFaults;
 use super::file::{CampaignFile, read};
 use super::plan::{Shape, cases};
 use crate::campaign::by_driver::ByDriver;
-use crate::campaign::by_manual::{ByManual, Said};
+use crate::campaign::by_manual::{ByManual, SentBytes};
 use crate::campaign::class::{CaseClass, CaseEvidence};
 use crate::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::campaign::sharing::Sharing;
@@ -41,12 +41,12 @@ pub(crate) struct Campaign {
     pub shape: Shape,
     /// The cases, in order.
     pub cases: Vec<CaseFaults>,
-    played: Played,
+    played: ReadyConversation,
 }
 
 /// What plays the campaign's conversation.
 #[derive(Debug)]
-enum Played {
+enum ReadyConversation {
     ByManual(Box<ByManual>),
     ByDriver(Box<ByDriver>),
 }
@@ -169,7 +169,7 @@ impl Campaign {
                     return Err(mistake(read.wrong(&["scenario"], message, expected)));
                 };
                 let shape = by_manual.answers().shape.clone();
-                (Played::ByManual(Box::new(by_manual)), shape)
+                (ReadyConversation::ByManual(Box::new(by_manual)), shape)
             }
             MasterTalk::Calls(calls) => {
                 let Some(by_driver) = ByDriver::new(start, calls) else {
@@ -182,7 +182,7 @@ impl Campaign {
                 };
                 let telegrams = telegrams(by_driver.sent());
                 (
-                    Played::ByDriver(Box::new(by_driver)),
+                    ReadyConversation::ByDriver(Box::new(by_driver)),
                     Shape { drives, telegrams },
                 )
             }
@@ -215,15 +215,15 @@ impl Campaign {
     /// Whether the driver plays, and not a master by the manual alone.
     #[must_use]
     pub(crate) fn by_driver(&self) -> bool {
-        matches!(self.played, Played::ByDriver(_))
+        matches!(self.played, ReadyConversation::ByDriver(_))
     }
 
     /// The driver, where it plays.
     #[cfg(test)]
     pub(crate) fn driver(&self) -> Option<&ByDriver> {
         match &self.played {
-            Played::ByDriver(by_driver) => Some(by_driver),
-            Played::ByManual(_) => None,
+            ReadyConversation::ByDriver(by_driver) => Some(by_driver),
+            ReadyConversation::ByManual(_) => None,
         }
     }
 
@@ -234,10 +234,10 @@ impl Campaign {
     pub(crate) fn play(
         &self,
         case: &CaseFaults,
-    ) -> Result<(CaseOutcome, Vec<Said>), Contradiction> {
+    ) -> Result<(CaseOutcome, Vec<SentBytes>), Contradiction> {
         let (evidence, said) = match &self.played {
-            Played::ByManual(by_manual) => by_manual.play(case),
-            Played::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
+            ReadyConversation::ByManual(by_manual) => by_manual.play(case),
+            ReadyConversation::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
         };
         Ok((self.outcome(case, evidence)?, said))
     }
@@ -272,8 +272,8 @@ impl Campaign {
     /// What its cases share; `None` where they have to be played from the start.
     pub(super) fn sharing(&self) -> Option<Sharing<'_>> {
         match &self.played {
-            Played::ByManual(by_manual) => Sharing::new(by_manual),
-            Played::ByDriver(_) => None,
+            ReadyConversation::ByManual(by_manual) => Sharing::new(by_manual),
+            ReadyConversation::ByDriver(_) => None,
         }
     }
 

@@ -13,7 +13,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_sim::novobus::cells::Cells;
 use harness_sim::novobus::shared::{
-    Became, MetSoFar, Passage, SentStream, SharedRing, SharedState,
+    MetSoFar, Passage, PlaceStep, SentStream, SharedRing, SharedState,
 };
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -34,11 +34,11 @@ pub(super) struct Front(usize);
 pub(super) struct Fork {
     front: Front,
     link: usize,
-    became: Became,
+    became: PlaceStep,
 }
 
 #[derive(Debug)]
-struct Kept {
+struct FrontPassage {
     passage: Passage,
     lasts: usize,
 }
@@ -49,7 +49,7 @@ pub(crate) struct Sharing<'a> {
     of: &'a ByManual,
     ring: SharedRing,
     start: SharedState,
-    fronts: Vec<Kept>,
+    fronts: Vec<FrontPassage>,
     /// The front without a fault, by how long the faults of the case last.
     sound: HashMap<usize, Front>,
     /// Fronts by where they fork from the one without a fault.
@@ -62,7 +62,7 @@ pub(crate) struct Sharing<'a> {
 }
 
 /// A ring of which the state is known.
-struct Known<'a> {
+struct KnownRing<'a> {
     ring: &'a mut SharedRing,
     state: SharedState,
     drives: u8,
@@ -76,7 +76,7 @@ impl Fork {
     }
 }
 
-impl DrivesBeyondBus for Known<'_> {
+impl DrivesBeyondBus for KnownRing<'_> {
     fn count(&self) -> u8 {
         self.drives
     }
@@ -104,7 +104,7 @@ impl DrivesBeyondBus for Known<'_> {
     }
 }
 
-impl Wire for Known<'_> {
+impl Wire for KnownRing<'_> {
     fn exchange(&mut self, bytes: &[u8]) -> Vec<Received> {
         let passage = self.ring.send(&self.state, bytes);
         self.state = passage.after().clone();
@@ -158,7 +158,7 @@ impl<'a> Sharing<'a> {
     }
 
     fn keep(&mut self, passage: Passage, lasts: usize) -> Front {
-        self.fronts.push(Kept { passage, lasts });
+        self.fronts.push(FrontPassage { passage, lasts });
         Front(self.fronts.len() - 1)
     }
 
@@ -236,7 +236,7 @@ impl<'a> Sharing<'a> {
     pub(super) fn evidence(&mut self, fork: Fork) -> CaseEvidence {
         let passage = self.passage(fork);
         let heard = self.ring.bytes(passage.heard());
-        let known = Known {
+        let known = KnownRing {
             ring: &mut self.ring,
             state: passage.after().clone(),
             drives: self.of.answers().shape.drives,

@@ -211,7 +211,7 @@ pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
         let first = find(|link| link.from.is_none())?;
         let last = find(|link| link.to.is_none())?;
         (!first.octets().is_empty())
-            .then(|| Beginning::of((capture, tolerance), ring, (first, last)).shown())
+            .then(|| Beginning::of(capture, tolerance, ring, first, last).shown())
     });
     let nothing = Shown::From {
         at: Instant::START,
@@ -241,9 +241,11 @@ struct Beginning {
 
 impl Beginning {
     fn of(
-        (capture, tolerance): (&Capture, Span),
+        capture: &Capture,
+        tolerance: Span,
         ring: &Trace,
-        (first, last): (&Channel, &Channel),
+        first: &Channel,
+        last: &Channel,
     ) -> Self {
         let good = |link: &Channel| {
             let octets = link.octets().iter().filter(|byte| byte.error.is_none());

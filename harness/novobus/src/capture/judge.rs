@@ -6,7 +6,7 @@ use super::begin::{
 use super::diff::{ComparedRun, Summary, compare};
 use super::open::explanations;
 use super::scenario::{SketchError, scenario_with, unforeseen};
-use super::stimuli::Told;
+use super::stimuli::CapturedFacts;
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::locate::locate;
@@ -53,7 +53,7 @@ const OF_DRIVES: &str = "what differs is process data, or lies in cells that a d
 const UNDER_WAY: &str = "the capture ends while bytes are under way: those that it lacks at its end were due within the time by which its ports are late; \
      end a capture when the line is silent";
 
-/// Why bytes that are missing behind a ResetH8 accuse no drive.
+/// Why bytes that are missing after a ResetH8 accuse no drive.
 const TESTS_ITSELF: &str = "what differs lies between a ResetH8 and the next silence, and nothing differs from there on: the drive may be silent while it tests \
      itself (ND21 10.5, 11.8); describe the drives with --setup";
 
@@ -268,7 +268,7 @@ fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, 
 fn judge_as(
     capture: &Capture,
     options: &JudgeOptions<'_>,
-    told: &[Told],
+    told: &[CapturedFacts],
     more: (&Header, Span),
 ) -> Result<Judged, JudgeError> {
     let (model, remarks) = model(capture, options, more)?;

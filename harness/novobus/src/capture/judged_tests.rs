@@ -312,7 +312,7 @@ fn whole_drives_are_right_drives() {
     assert!(why.contains("whole ND21s"), "{why}");
 }
 
-/// ND21 10.5, 11.8: a drive may be silent behind ResetH8. It may not answer wrong when it is back, nor be silent without one.
+/// ND21 10.5, 11.8: a drive may be silent after ResetH8. It may not answer wrong when it is back, nor be silent without one.
 #[test]
 fn a_drive_may_be_silent_while_it_tests_itself() {
     let silent = text("10.5-silent-self-test");
@@ -395,7 +395,7 @@ fn what_is_left_to_the_drive_excuses_nothing_else() {
     }
 }
 
-/// What comes back stands beside what was asked again behind a whole check sequence (ND21 9.8), where a byte was lost or drives sent zeros
+/// What comes back stands beside what was asked again after a whole check sequence (ND21 9.8), where a byte was lost or drives sent zeros
 /// unasked in front of it.
 #[test]
 fn answers_behind_a_lost_byte_are_read_again() {

@@ -1,7 +1,7 @@
 //! What a capture does not show of a right drive: whether it monitors time-outs, and how it does what the manual leaves open. One of them
 //! may be why a ring differs from plain memory.
 
-use super::stimuli::Told;
+use super::stimuli::CapturedFacts;
 use crate::choice::{Choice, of_the_bus};
 use crate::language::syntax::{CellPlace, DriveRange, Header, Setup, SetupKind, Written};
 use harness_bench::capture::Capture;
@@ -38,7 +38,7 @@ impl Explanation {
 }
 
 /// What may explain a difference, the simplest first: monitoring, whole drives, then each open value of the bus without monitoring and with it.
-pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation> {
+pub(super) fn explanations(capture: &Capture, told: &[CapturedFacts]) -> Vec<Explanation> {
     if capture.bytes() > MOST_BYTES {
         return Vec::new();
     }
@@ -93,7 +93,7 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
 }
 
 /// Whether a drive has reported whether it monitors.
-fn says(told: &[Told], ring: usize, drive: u8) -> bool {
+fn says(told: &[CapturedFacts], ring: usize, drive: u8) -> bool {
     let told = told.get(ring);
     told.is_some_and(|told| told.cells.contains_key(&(drive, ram::FLAGS2)))
 }

@@ -1,7 +1,7 @@
 //! Converts a capture to a scenario: the bytes sent with their times, the faults on the way, and the bytes that came back.
 
 use super::faults::faults;
-use super::stimuli::{Told, told};
+use super::stimuli::{CapturedFacts, told};
 use crate::language::syntax::{
     CellPlace, DriveRange, Header, RingStep, Scenario, Setup, SetupKind, Step, Written,
 };
@@ -109,7 +109,7 @@ struct Ring<'c> {
     first: &'c Channel,
     /// What arrived at the master.
     received: Vec<Received>,
-    told: Told,
+    told: CapturedFacts,
 }
 
 impl<'c> Ring<'c> {
@@ -270,9 +270,8 @@ fn receives(text: &mut Text, index: usize, ring: &Ring<'_>, width: usize) {
 }
 
 /// Bytes received, counted from 0, that cannot be foretold, ring by ring.
-pub(crate) fn unforeseen(capture: &Capture) -> Vec<Told> {
+pub(crate) fn unforeseen(capture: &Capture) -> Vec<CapturedFacts> {
     let rings = capture.traces.iter().enumerate();
-    rings
-        .map(|(index, trace)| Ring::of(index, trace).map_or_else(|_| Told::default(), |r| r.told))
-        .collect()
+    let told = rings.map(|(index, trace)| Ring::of(index, trace).map(|ring| ring.told));
+    told.map(Result::unwrap_or_default).collect()
 }

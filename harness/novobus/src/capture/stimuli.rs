@@ -20,7 +20,7 @@ const RESET: &str = "10.5";
 
 /// What the first and the last link of a ring show.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Told {
+pub(crate) struct CapturedFacts {
     /// What cells held before: drive and address.
     pub(crate) cells: BTreeMap<(u8, u16), u8>,
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
@@ -35,7 +35,7 @@ pub(crate) struct Told {
 
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
 /// was captured.
-pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
+pub(crate) fn told(size: RingSize, trace: &Trace) -> CapturedFacts {
     let first = trace.channels.iter().find(|link| link.from.is_none());
     let sent: Vec<_> = first
         .iter()
@@ -51,18 +51,18 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .into_iter()
         .zip(&sent)
         .filter(|(role, (_, (byte, _)))| !(*role == Role::Idle && *byte == PAUSE))
-        .map(|(role, (at, _))| Asked { role, at: *at })
+        .map(|(role, (at, _))| SentByte { role, at: *at })
         .collect();
-    let reset = |byte: &Asked| match byte.role {
+    let reset = |byte: &SentByte| match byte.role {
         Role::Command {
             section: RESET,
             drive,
         } => Some((byte.at, drive?)),
         _ => None,
     };
-    let mut told = Told {
+    let mut told = CapturedFacts {
         resets: asked.iter().filter_map(reset).collect(),
-        ..Told::default()
+        ..CapturedFacts::default()
     };
     for link in trace.channels.iter().filter(|link| link.from.is_some()) {
         let told_by_link = of_link(link, &asked, size.drives());
@@ -84,7 +84,7 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
 
 /// A byte that the master has sent and that comes back.
 #[derive(Clone, Copy)]
-struct Asked {
+struct SentByte {
     role: Role,
     /// When its stop bit had passed.
     at: Instant,
@@ -94,9 +94,9 @@ struct Asked {
 const QUIET: Span = Span::from_millis(20);
 const QUIET_A_DRIVE: Span = Span::from_micros(1_200);
 
-/// Where the bytes behind each silence of the master's begin, where fewer bytes came than were sent: those in front of it that are missing do
+/// Where the bytes after each silence of the master's begin, where fewer bytes came than were sent: those in front of it that are missing do
 /// not come any more.
-fn behind_silences(asked: &[Asked], came: usize, stations: u8) -> Vec<(Instant, usize)> {
+fn behind_silences(asked: &[SentByte], came: usize, stations: u8) -> Vec<(Instant, usize)> {
     if came >= asked.len() {
         return Vec::new();
     }
@@ -106,17 +106,17 @@ fn behind_silences(asked: &[Asked], came: usize, stations: u8) -> Vec<(Instant, 
     behind.map(|(place, two)| (two[1].at, place + 1)).collect()
 }
 
-/// Where the bytes behind each whole check sequence begin, with the time at which it had been sent.
-fn behind_sequences(asked: &[Asked]) -> Vec<(Instant, usize)> {
+/// Where the bytes after each whole check sequence begin, with the time at which it had been sent.
+fn behind_sequences(asked: &[SentByte]) -> Vec<(Instant, usize)> {
     let in_sequence =
-        |byte: Option<&Asked>| byte.is_some_and(|byte| byte.role == Role::CheckSequence);
+        |byte: Option<&SentByte>| byte.is_some_and(|byte| byte.role == Role::CheckSequence);
     let ends = asked.iter().enumerate().filter(|(index, byte)| {
         in_sequence(Some(byte)) && !in_sequence(asked.get(index.saturating_add(1)))
     });
     ends.map(|(index, byte)| (byte.at, index + 1)).collect()
 }
 
-/// What was asked behind a check sequence that has come back whole at `at`: `beside`, where no byte was lost and none came unasked.
+/// What was asked after a check sequence that has come back whole at `at`: `beside`, where no byte was lost and none came unasked.
 fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
     let known = sequences.binary_search_by_key(&beside, |(_, at)| *at);
     if known.is_ok() {
@@ -129,11 +129,11 @@ fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
 
 /// Reads a link beside what was asked. What comes back stands beside what was asked until bytes are lost or drives send zeros unasked (9.9);
 /// a whole check sequence ends that (9.8), and where bytes were lost, a silence of the master's.
-fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
+fn of_link(link: &Channel, asked: &[SentByte], stations: u8) -> CapturedFacts {
     let sequences = behind_sequences(asked);
     let silences = behind_silences(asked, link.octets().len(), stations);
     let mut reader = Reader {
-        told: Told::default(),
+        told: CapturedFacts::default(),
         sender: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
         written: BTreeSet::new(),
@@ -187,7 +187,7 @@ fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
 }
 
 struct Reader {
-    told: Told,
+    told: CapturedFacts,
     /// The drive that sends on this link, where what was sent is read, and not what arrived.
     sender: Option<u8>,
     /// What a cell holds now; `None` if it was written with an unknown result.

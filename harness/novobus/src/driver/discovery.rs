@@ -31,7 +31,7 @@ pub(crate) fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize,
 }
 
 /// Brings a ring back and counts its drives. As many check sequences as the largest ring needs are sent where something comes back behind the
-/// first two (9.8). Drives behind a time-out pass on seven zeros and then an address (9.9), so that a drive behind them may not hear the eight
+/// first two (9.8). Drives after a time-out pass on seven zeros and then an address (9.9), so that a drive behind them may not hear the eight
 /// zeros for which it waits (9.7). After the first check sequence they are drives that pass on 17.
 fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
     let (first, heard) = counted(link, ring, &CHECK_SEQUENCE.repeat(2));
@@ -133,14 +133,14 @@ pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
 pub(crate) struct Recovery {
     /// The drive that spelled out its address before.
     pub before: Option<SpelledOut>,
-    /// The drive that does so behind the check sequence: the ring is not back.
+    /// The drive that does so after the check sequence: the ring is not back.
     pub after: Option<u8>,
-    /// Zeros come without end although nothing is sent, also behind the check sequence. A drive in error mode answers each byte with one
+    /// Zeros come without end although nothing is sent, also after the check sequence. A drive in error mode answers each byte with one
     /// (9.7), so these are no report of drive 0.
     pub zeros_unasked: bool,
     /// How many drives answer; `None` where the ring is not back.
     pub drives: Option<RingSize>,
-    /// The last bytes that came for those that were sent behind the check sequence, where the ring is not back and no drive spells out its
+    /// The last bytes that came for those that were sent after the check sequence, where the ring is not back and no drive spells out its
     /// address.
     pub heard: Vec<u8>,
 }

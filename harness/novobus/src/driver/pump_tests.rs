@@ -92,7 +92,7 @@ fn played(
     assert_eq!(bus.corrected_errors(), 0);
     let end = bus.now();
     bus.close();
-    // SYNCO behind the last answer may still be on its way.
+    // SYNCO after the last answer may still be on its way.
     link.run_until(link.now() + Span::from_millis(50));
     let sent = link.trace(0).channels[0].octets().to_vec();
     let sent = sent
@@ -145,7 +145,7 @@ fn an_adapter_is_never_without_bytes() {
     );
 }
 
-/// The pump tells the link when an awaited answer is due, whatever is sent behind the request.
+/// The pump tells the link when an awaited answer is due, whatever is sent after the request.
 #[test]
 fn an_answer_is_attended_to_when_it_comes() {
     for near in [Span::ZERO, Span::from_millis(4)] {

@@ -26,7 +26,7 @@ const ROM: usize = (*ROM_WORDS.end() - *ROM_WORDS.start()) as usize + 1;
 
 /// The memory of one of the two drives: every choice is made with the bits of `choice`.
 #[derive(Clone, Debug)]
-struct Chosen {
+struct ChoiceMemory {
     choice: u8,
     ram: Box<[u8; RAM]>,
     rom: Box<[u8; ROM]>,
@@ -44,7 +44,7 @@ struct Chosen {
     was_reset: bool,
 }
 
-impl Chosen {
+impl ChoiceMemory {
     fn new(choice: u8) -> Self {
         Self {
             choice,
@@ -80,7 +80,7 @@ impl Chosen {
     }
 }
 
-impl Chosen {
+impl ChoiceMemory {
     /// Whether the drive's program works with a cell in a way that changes what it answers or how (ND21 9.9, 14.2.1, 14.10.6).
     fn is_used(&self, cell: u16) -> bool {
         let monitors = cell == ram::FLAGS2 && self.held(cell) & flags2::MONITORING != 0;
@@ -93,7 +93,7 @@ impl Chosen {
     }
 }
 
-impl Memory for Chosen {
+impl Memory for ChoiceMemory {
     fn read(&mut self, address: u16) -> u8 {
         let mut value = match own::is_own(address) && !self.asks_for_address {
             true => self.choice,
@@ -139,7 +139,7 @@ impl Memory for Chosen {
 #[derive(Clone, Debug)]
 struct Drive {
     ends: [BusEnd; 2],
-    cells: [Chosen; 2],
+    cells: [ChoiceMemory; 2],
 }
 
 /// A byte as the two of them see it; they may differ in whether there is one.
@@ -150,7 +150,7 @@ impl Drive {
         let end = BusEnd::new(properties);
         Self {
             ends: [end.clone(), end],
-            cells: [Chosen::new(0x00), Chosen::new(0xFF)],
+            cells: [ChoiceMemory::new(0x00), ChoiceMemory::new(0xFF)],
         }
     }
 
@@ -327,7 +327,7 @@ impl RingModel {
     }
 
     /// Takes over what was received for a byte that was sent.
-    pub(crate) fn take(&mut self, (sent, role): (u8, Role), must: Must, received: u8) {
+    pub(crate) fn take(&mut self, sent: u8, role: Role, must: Must, received: u8) {
         if matches!(role, Role::CheckSequence | Role::Foreign) {
             self.answers.clear();
         }

@@ -59,7 +59,7 @@ struct Mismatch {
     must: Option<Must>,
     /// The section of the manual with the rule, and the rule in a few words.
     rule: (&'static str, &'static str),
-    /// The drive that the telegram of the byte addresses. `None` behind an error: drives in the error mode read no telegrams (ND21 9.7).
+    /// The drive that the telegram of the byte addresses. `None` after an error: drives in the error mode read no telegrams (ND21 9.7).
     meant: Option<u8>,
 }
 
@@ -179,7 +179,7 @@ impl Judge {
                 };
                 let Some(what) = self.compare(out, must, exchange.received.get(index)) else {
                     let received = exchange.received.get(index).map_or(0, |byte| byte.byte);
-                    self.model.take((*byte, *role), must, received);
+                    self.model.take(*byte, *role, must, received);
                     index += 1;
                     continue;
                 };
@@ -287,7 +287,7 @@ impl Judge {
                 if must.open != 0 || check || model.was_reset() {
                     seen.open.push(seen.count);
                 }
-                model.take((*byte, *role), must, must.byte);
+                model.take(*byte, *role, must, must.byte);
                 seen.count += 1;
             }
             seen.is_harmful |= model.writes_what_drives_use();

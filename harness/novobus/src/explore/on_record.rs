@@ -97,7 +97,7 @@ impl AttemptRecord {
     }
 }
 
-/// The acts of conversations behind the first one, which belongs to making the drives ready.
+/// The acts of conversations after the first one, which belongs to making the drives ready.
 pub(super) fn acts(before: &[AnsweredCase]) -> Vec<Act> {
     let cases = before.iter().skip(1).map(|answered| &answered.case);
     cases.flat_map(|case| case.acts.iter().cloned()).collect()
@@ -270,7 +270,7 @@ mod tests {
     use super::super::judge::prologue;
     use super::*;
 
-    /// ND21 9.9: drives that monitor time-outs answer with zeros behind a silence of the bench. Zeros behind none are a drive's fault.
+    /// ND21 9.9: drives that monitor time-outs answer with zeros after a silence of the bench. Zeros behind none are a drive's fault.
     #[test]
     fn only_a_silence_excuses_zeros() {
         let case = prologue(3, None);

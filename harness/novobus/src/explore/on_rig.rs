@@ -127,7 +127,7 @@ impl<'r, 's> OnRig<'r, 's> {
             self.possible[ring] = judge.possible();
             let case = prologue(rings[ring].drives(), beside_of(&rings, ring));
             let link = self.run.session().link();
-            let Said { received, .. } = converse(link, &case, case.bytes().len());
+            let CaseTraffic { received, .. } = converse(link, &case, case.bytes().len());
             let received: Vec<_> = received.into_iter().map(|(_, byte)| byte).collect();
             // A difference here shows again in the first case.
             let _again = judge
@@ -165,7 +165,7 @@ impl OnRig<'_, '_> {
     }
 
     /// When bytes went and came. Times that a late computer saw tell nothing of the drives.
-    fn times(&mut self, said: &Said) -> ByteTimes {
+    fn times(&mut self, said: &CaseTraffic) -> ByteTimes {
         let link = self.run.session().link();
         let units = |at: &Instant| at.since_start().units();
         ByteTimes {
@@ -193,7 +193,7 @@ impl Target<Case> for OnRig<'_, '_> {
             }
         }
         let ring = case.ring();
-        let Said { received, took, .. } = converse(&mut link, case, usize::MAX);
+        let CaseTraffic { received, took, .. } = converse(&mut link, case, usize::MAX);
         let trace = link.trace(ring);
         let denied = match link.trouble() {
             Some(trouble) => Some(trouble.to_string()),
@@ -312,7 +312,7 @@ impl Target<Case> for OnRig<'_, '_> {
 }
 
 /// What was said in a case.
-struct Said {
+struct CaseTraffic {
     received: Vec<(Instant, Received)>,
     /// The time of each byte sent.
     sent: Vec<Instant>,
@@ -323,7 +323,7 @@ struct Said {
 }
 
 /// Sends a case and waits for `count` bytes.
-fn converse(link: &mut dyn Link, case: &Case, count: usize) -> Said {
+fn converse(link: &mut dyn Link, case: &Case, count: usize) -> CaseTraffic {
     let ring = case.ring();
     let mut late = false;
     link.begin();
@@ -349,7 +349,7 @@ fn converse(link: &mut dyn Link, case: &Case, count: usize) -> Said {
     let round = byte_time * (u64::from(case.drives) + 2) + link.time_tolerance() + PATIENCE;
     let end = due.last().copied().unwrap_or(link.now()) + round;
     late |= await_bytes(link, ring, count, end, &mut received);
-    Said {
+    CaseTraffic {
         received,
         sent: due,
         took: link.now().since_start(),

@@ -2,7 +2,7 @@
 //!
 //! Every accepted step removes or lowers something, so [`Case::measure`] falls strictly and shrinking ends. The order of the steps is
 //! fixed, so the result is reproducible. On hardware the runs dominate the cost, so the steps that remove most come first: everything
-//! behind the differing byte, then acts, parts of acts, faults, drives, silence and values.
+//! after the differing byte, then acts, parts of acts, faults, drives, silence and values.
 
 use super::case::{Act, ActKind, Case, Harm, MOST_NET, OtherRing, Talk, To};
 use super::oracle::Difference;
@@ -161,7 +161,7 @@ impl Shrinker<'_, '_> {
         Ok(())
     }
 
-    /// Cuts the case behind the differing byte, or, if the finding is lost by that, behind the act of this byte.
+    /// Cuts the case after the differing byte, or, if the finding is lost by that, behind the act of this byte.
     fn cut_behind(&mut self) -> Result<(), ExploreError> {
         let Some(byte) = self.difference.byte else {
             return Ok(());

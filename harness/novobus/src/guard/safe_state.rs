@@ -153,7 +153,7 @@ fn once(line: &mut OneRing<'_>, size: RingSize, standing: &Standstill) -> Vec<No
         Err(error) => return all(error.to_string()),
     };
     let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
-    let mut drives: Vec<_> = axes.map(Told::new).collect();
+    let mut drives: Vec<_> = axes.map(Halt::new).collect();
     let mut told = 0;
     for step in &standing.order {
         for command in commands(*step) {
@@ -176,7 +176,7 @@ fn once(line: &mut OneRing<'_>, size: RingSize, standing: &Standstill) -> Vec<No
 }
 
 /// A drive on its way to the safe state.
-struct Told {
+struct Halt {
     axis: Axis,
     /// Why it is not in its safe state.
     why: Option<String>,
@@ -185,7 +185,7 @@ struct Told {
     seen: bool,
 }
 
-impl Told {
+impl Halt {
     const fn new(axis: Axis) -> Self {
         Self {
             axis,
@@ -204,10 +204,10 @@ impl Told {
 /// After the first missing answer, the answers behind it are not waited for.
 fn together(
     bus: &OpenRings<'_>,
-    drives: &[Told],
+    drives: &[Halt],
     command: Command,
 ) -> Vec<Result<Option<u32>, String>> {
-    let start = |drive: &Told| bus.start(drive.axis, |k| Job::new(k, command));
+    let start = |drive: &Halt| bus.start(drive.axis, |k| Job::new(k, command));
     let orders: Vec<_> = drives.iter().map(start).collect();
     let mut lost: Option<String> = None;
     let result = |order: Result<OrderNumber, Error>| match (&lost, order) {
@@ -222,8 +222,8 @@ fn together(
 }
 
 /// Waits until every drive stands and its `Flags` show the bits in `told`. A drive that failed before gets only [`FLAGS`] of time.
-fn wait_until_seen(bus: &OpenRings<'_>, drives: &mut [Told], told: u8, standing: &Standstill) {
-    let read = |drives: &[Told], address, whole| {
+fn wait_until_seen(bus: &OpenRings<'_>, drives: &mut [Halt], told: u8, standing: &Standstill) {
+    let read = |drives: &[Halt], address, whole| {
         let command = match whole {
             true => Command::ReadWord { address },
             false => Command::ReadByte { address },

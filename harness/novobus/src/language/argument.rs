@@ -168,7 +168,7 @@ pub(crate) fn assignments(texts: &[String]) -> Result<Vec<(MemoryRange, Written)
         let name = text.strip_suffix(scanner.rest()).unwrap_or_default();
         location.writable()?;
         equals(scanner)?;
-        let value = own_value(scanner, location.place.scale(), (&location, name))?;
+        let value = own_value(scanner, location.place.scale(), &location, name)?;
         Ok((location, value))
     })
 }
@@ -177,7 +177,8 @@ pub(crate) fn assignments(texts: &[String]) -> Result<Vec<(MemoryRange, Written)
 fn own_value(
     scanner: &mut Scanner<'_>,
     scale: Option<Scale>,
-    (location, name): (&MemoryRange, &str),
+    location: &MemoryRange,
+    name: &str,
 ) -> Result<Written, Problem> {
     let start = scanner.here();
     if scanner.eat("0x") {
@@ -233,7 +234,7 @@ pub(crate) fn value_at(
     location: &MemoryRange,
 ) -> Result<Written, Problem> {
     let mut scanner = Scanner::new(text, offset);
-    let value = own_value(&mut scanner, location.scale, (location, &location.name()))?;
+    let value = own_value(&mut scanner, location.scale, location, &location.name())?;
     scanner.expect_end()?;
     Ok(value)
 }

@@ -29,7 +29,7 @@ use std::io::Write;
 pub(crate) const HEADING: &str =
     "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
 
-/// Writes one or two rings of a run, one behind the other.
+/// Writes one or two rings of a run, one after the other.
 ///
 /// # Errors
 /// What the writer says.

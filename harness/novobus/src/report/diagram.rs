@@ -8,7 +8,7 @@ use super::picture::{LEFT, MAX_AREAS, ROW, RingPicture, TOP};
 use super::walk::SenderState;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng::name;
-use harness_bench::shown::RowPlacing;
+use harness_bench::shown::{RowPlacing, TraceView};
 use harness_proto::line::Rate;
 use harness_sim::record::{Channel, LineByte, Trace};
 use serde::Serialize;
@@ -42,23 +42,17 @@ struct Data {
     times: Vec<Vec<u64>>,
 }
 
-/// Writes the diagram of one ring. `id` names its parts; `differs` is the number of the first byte that the master received and that differs from
-/// what was expected, counted from 1.
-pub(crate) fn diagram(
-    html: &mut Html,
-    id: &str,
-    title: &str,
-    (ring, trace): (usize, &Trace),
-    (rate, differs): (Rate, Option<usize>),
-) {
-    let mut picture = RingPicture::new((ring, trace), (RowPlacing::Index, rate), None, MAX_AREAS);
-    if let Some([link, row]) = differs.and_then(|byte| received(trace, byte)) {
+/// Writes the diagram of one ring.
+pub(crate) fn diagram(html: &mut Html, view: &TraceView<'_>, title: &str) {
+    let (ring, trace, rate) = (view.ring, view.trace, view.rate);
+    let mut picture = RingPicture::new(ring, trace, RowPlacing::Index, rate, None, MAX_AREAS);
+    if let Some([link, row]) = view.differs.and_then(|byte| received(trace, byte)) {
         picture.mark(link, row);
     }
     html.element("div", &[("class", &"ring")], |html| {
         html.scroll(title, |html| {
             let title = format!("Space-time diagram: {title}");
-            let (id, words) = (format!("{id}-"), picture.description());
+            let (id, words) = (format!("{}-", view.id), picture.description());
             html.picture(&id, picture.size(), &title, &words, |html| {
                 picture.draw(html);
             });
@@ -213,7 +207,7 @@ fn data(ring: usize, trace: &Trace, picture: &RingPicture<'_>, rate: Rate) -> Da
     }
 }
 
-/// Times as runs of bytes without a gap: how long behind the byte before the first one ends, and how many they are.
+/// Times as runs of bytes without a gap: how long after the byte before the first one ends, and how many they are.
 fn times(ends: impl Iterator<Item = u64>, byte: u64) -> Vec<u64> {
     let mut runs: Vec<u64> = Vec::new();
     let (mut shown, mut due) = (0, None);

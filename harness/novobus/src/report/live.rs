@@ -43,7 +43,7 @@ impl Kind {
 
 /// A line that is being made.
 #[derive(Clone, Debug, Default)]
-struct Begun {
+struct OpenLine {
     kind: Kind,
     bytes: usize,
     text: String,
@@ -59,7 +59,7 @@ pub(crate) struct LinkText {
     drives: Option<u8>,
     /// A pause that ends a line, in nanoseconds.
     pause: u64,
-    begun: Begun,
+    begun: OpenLine,
     /// When the last byte came, in nanoseconds.
     last: u64,
     /// What the master has received since the last check sequence.
@@ -76,7 +76,7 @@ impl LinkText {
             to,
             drives,
             pause: rate.byte_time().as_nanos() * 2,
-            begun: Begun::default(),
+            begun: OpenLine::default(),
             last: 0,
             heard: Vec::new(),
             named: None,

@@ -186,7 +186,7 @@ fn sync_words(byte: u8) -> String {
 
 /// A command that has begun.
 #[derive(Clone, Debug)]
-struct Begun {
+struct OpenCommand {
     layout: &'static Layout,
     bytes: Vec<u8>,
 }
@@ -202,7 +202,7 @@ pub(crate) struct Observer {
     address_next: bool,
     net: u8,
     process_data: u8,
-    begun: BTreeMap<u8, Begun>,
+    begun: BTreeMap<u8, OpenCommand>,
     /// The receiver takes nothing for a telegram any more.
     foreign: bool,
     /// Good zeros in a row, from the offending byte on (9.7).
@@ -351,7 +351,7 @@ impl Observer {
                 return (!looked_at).then_some(meaning);
             };
             let bytes = vec![byte];
-            self.begun.insert(target, Begun { layout, bytes });
+            self.begun.insert(target, OpenCommand { layout, bytes });
             meaning.role = ByteRole::Command;
             meaning.command = Some(layout);
             return Some(meaning);

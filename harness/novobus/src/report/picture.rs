@@ -98,8 +98,10 @@ impl Times {
 impl<'t> RingPicture<'t> {
     /// The wanted rows of a ring's trace, all where `None`, as at most `most` areas.
     pub(crate) fn new(
-        (ring, trace): (usize, &'t Trace),
-        (placing, rate): (RowPlacing, Rate),
+        ring: usize,
+        trace: &'t Trace,
+        placing: RowPlacing,
+        rate: Rate,
         rows: Option<Range<usize>>,
         most: usize,
     ) -> Self {

@@ -81,13 +81,7 @@ impl SegmentReport for RingReport {
         };
         let mut html = Html::new();
         let title = format!("{}{which}", view.title);
-        diagram(
-            &mut html,
-            view.id,
-            &title,
-            (view.ring, view.trace),
-            (view.rate, view.differs),
-        );
+        diagram(&mut html, view, &title);
         let mut parts = vec![(format!("Space-time diagram{which}"), html)];
         let mut html = Html::new();
         if sequence(&mut html, view.id, view.trace) {

@@ -204,7 +204,7 @@ fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
     }
 }
 
-/// Zeros, numbers and check sequences: bytes of a kind one behind another are one event.
+/// Zeros, numbers and check sequences: bytes of a kind one after another are one event.
 fn open_run(role: ByteRole, master: bool, at: Instant, events: &mut Vec<Event>) -> Option<usize> {
     let (kind, what) = match role {
         ByteRole::ErrorZero if master => (Kind::Sequence, "zeros"),

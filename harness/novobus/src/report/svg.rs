@@ -41,12 +41,11 @@ path.x{stroke:#ff8a80}path.y{fill:#ff8a80}}";
 #[must_use]
 pub(crate) fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
     let most = MAX_AREAS / traces.len().max(1);
-    let placing = (options.scale, options.rate);
-    let pictures: Vec<_> = traces
-        .iter()
-        .enumerate()
-        .map(|ring| RingPicture::new(ring, placing, options.rows.clone(), most))
-        .collect();
+    let pictures = traces.iter().enumerate().map(|(ring, trace)| {
+        let rows = options.rows.clone();
+        RingPicture::new(ring, trace, options.scale, options.rate, rows, most)
+    });
+    let pictures: Vec<_> = pictures.collect();
     let mut legend: Vec<_> = pictures.iter().flat_map(RingPicture::legend).collect();
     legend.sort_unstable();
     legend.dedup();

@@ -53,6 +53,8 @@ pub(crate) fn write(
 }
 
 fn number(state: SenderState) -> u8 {
-    let place = SenderState::ALL.iter().position(|own| *own == state);
-    place.and_then(|own| u8::try_from(own).ok()).unwrap_or(7)
+    let place = SenderState::ALL.iter().position(|known| *known == state);
+    place
+        .and_then(|place| u8::try_from(place).ok())
+        .unwrap_or(7)
 }

@@ -25,7 +25,7 @@ const FAULTS: [(&str, &str); 6] = [
     ("break 5ms", "hold the line at 0 for 5 ms"),
 ];
 
-/// SYNCO bytes behind a fault, where no master is connected: the ring spells the drive out within 25 zeros (ND21 9.7).
+/// SYNCO bytes after a fault, where no master is connected: the ring spells the drive out within 25 zeros (ND21 9.7).
 const BEHIND_A_FAULT: usize = 40;
 /// How many bytes of the bench's own may wait for the line.
 const ROOM: usize = 256;

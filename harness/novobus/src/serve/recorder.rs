@@ -38,7 +38,7 @@ pub(crate) struct Recorder {
     /// The drives of each ring, and its first column.
     rings: Vec<(u8, usize)>,
     /// By the number of the byte time in which a byte arrived.
-    slots: BTreeMap<u64, Vec<Seen>>,
+    slots: BTreeMap<u64, Vec<LinkByte>>,
     counts: Vec<LinkCount>,
     /// How many of the bytes that were sent on each link have been taken, as remarks count them.
     delivered: Vec<u64>,
@@ -51,7 +51,7 @@ pub(crate) struct Recorder {
 
 /// A byte of a link.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct LinkByte {
     column: usize,
     byte: LineByte,
     /// What its sender remarked.
@@ -191,7 +191,7 @@ impl Recorder {
             }
             let slot = byte.at.since_start().units() / self.byte.units().max(1);
             let marks = self.marks(column, byte);
-            let seen = Seen {
+            let seen = LinkByte {
                 column,
                 byte: *byte,
                 marks,
@@ -302,7 +302,7 @@ fn note(ring: usize, drives: u8, location: Location) -> String {
 }
 
 /// Whether links carried nothing but whole SYNCO.
-fn is_idle(cells: &[Seen]) -> bool {
+fn is_idle(cells: &[LinkByte]) -> bool {
     let mut cells = cells.iter();
     cells.all(|seen| {
         let plain = seen.byte.sent == Some(SYNCO) && !is_damaged(&seen.byte);
@@ -315,7 +315,7 @@ fn is_damaged(byte: &LineByte) -> bool {
 }
 
 /// A byte as the picture shows it: its marks, what was sent, and what arrived where that differs.
-fn cell(seen: &Seen) -> LiveCell {
+fn cell(seen: &LinkByte) -> LiveCell {
     let (column, byte) = (seen.column, &seen.byte);
     let digits = |byte: Option<u8>| byte.map_or("--".to_owned(), |byte| format!("{byte:02X}"));
     let sent = signs(seen.marks) + &digits(byte.sent);

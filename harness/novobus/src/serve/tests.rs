@@ -127,7 +127,7 @@ fn a_byte_that_somebody_may_wait_for_is_awaited() {
 }
 
 /// ND21 9.7, 9.8: a byte that the client marks as damaged is a parity error for the first drive; the ring spells its address out,
-/// and the check sequence behind 17 zeros brings it back.
+/// and the check sequence after 17 zeros brings it back.
 #[test]
 fn a_marked_byte_is_a_parity_error_for_the_first_drive() {
     let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::InBand);

@@ -371,7 +371,7 @@ fn recovery_of_9_8() {
     assert_eq!((open.drives, &open.heard[..]), (None, &[][..]));
 }
 
-/// ND21 9.8, 9.9: a sound ring that monitors time-outs is brought back and counted behind every silence, however many of its drives have not
+/// ND21 9.8, 9.9: a sound ring that monitors time-outs is brought back and counted after every silence, however many of its drives have not
 /// noticed that the one before them is in the error mode.
 #[test]
 fn a_sound_ring_is_counted_behind_every_silence() {

@@ -316,7 +316,7 @@ fn planted_in_turn(step: usize, named: usize, culprits: usize) {
     assert!(blamed >= culprits, "{blamed}");
 }
 
-/// An oscilloscope that stands, as it does behind a reset (14.10.6.5): it records nothing in the cells that are tested.
+/// An oscilloscope that stands, as it does after a reset (14.10.6.5): it records nothing in the cells that are tested.
 const STANDS: &str = "drive 0..last memory scope_status = 80";
 
 /// A scenario or a conversation of a qualification by its name.
@@ -463,7 +463,7 @@ fn a_ring_that_is_asked_shows_what_is_wrong() {
 }
 
 /// ND21 9.6, 9.7: the section is that of the rule that is broken. A drive that finds a wrong checking byte and begins its zeros one byte late
-/// breaks the rules of the error mode, and one that finds nothing those of the checking byte. Zeros behind a silence are those of 9.9.
+/// breaks the rules of the error mode, and one that finds nothing those of the checking byte. Zeros after a silence are those of 9.9.
 #[test]
 fn the_section_is_that_of_the_broken_rule() {
     let (drive_1, checksum) = (Meant::Own(1), "qualify-checksum-drive-1");
@@ -631,7 +631,7 @@ fn sighted_by(
 }
 
 /// What these conversations are made for: ND21 10.1 (ROM is compared with itself, and longs go over the ends of pages), 14.4.1 and 14.10.1
-/// (`Status` behind an error of the bus).
+/// (`Status` after an error of the bus).
 #[test]
 fn conversations_find_their_deviations() {
     for (name, wrong) in [

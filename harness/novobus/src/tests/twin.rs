@@ -151,7 +151,7 @@ fn probes_tell_properties() {
     }
 }
 
-/// ND21 9.9: one probe finds the time-out, the wait behind it and the fate of a byte during that wait, and keeps them apart.
+/// ND21 9.9: one probe finds the time-out, the wait after it and the fate of a byte during that wait, and keeps them apart.
 #[test]
 fn a_time_out_is_told_from_the_wait_behind_it() {
     let all = |property: &str, ms: u64| format!("drive 0..last property {property} = {ms}ms");
@@ -373,7 +373,7 @@ fn a_divergence_says_where() {
     assert_eq!(explaining(&[none], &seen, EXACT, &twin), Ok(Vec::new()));
 }
 
-/// ND21 9.2, 9.5: data that a drive measures are its own, also behind a PAUSE and in a command that is cut over telegrams.
+/// ND21 9.2, 9.5: data that a drive measures are its own, also after a PAUSE and in a command that is cut over telegrams.
 #[test]
 fn measured_data_are_nobodys_wherever_they_stand() {
     let lines = ["drive 1 cooler 60C".to_owned()];

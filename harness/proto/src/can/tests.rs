@@ -109,7 +109,7 @@ fn crc_of_the_catalogue() {
     assert_eq!(independent::remainder(&bits), "000010110011110");
 }
 
-/// ISO 11898-1: a frame without runs has no stuff bits; the longest one has a stuff bit for every four bits behind the first.
+/// ISO 11898-1: a frame without runs has no stuff bits; the longest one has a stuff bit for every four bits after the first.
 #[test]
 fn shortest_and_longest() {
     let lengths = |frame: &Frame| (frame.wire_bits(), independent::wire_bits(frame));

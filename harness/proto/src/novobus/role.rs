@@ -118,7 +118,7 @@ pub fn roles(ring: RingSize, sent: &[(u8, bool)]) -> Vec<Role> {
     roles_with(ring, sent, &Properties::default())
 }
 
-/// The same for drives with these properties of `ReadLong` (10.1) and of short addresses behind a check sequence (9.2).
+/// The same for drives with these properties of `ReadLong` (10.1) and of short addresses after a check sequence (9.2).
 #[must_use]
 pub fn roles_with(ring: RingSize, sent: &[(u8, bool)], properties: &Properties) -> Vec<Role> {
     read(ring, sent, properties).0
@@ -306,7 +306,7 @@ mod tests {
         );
     }
 
-    /// ND21 9.8: everything behind an error is foreign until the check sequence.
+    /// ND21 9.8: everything after an error is foreign until the check sequence.
     #[test]
     fn behind_an_error() {
         let sent = [0, 0xFF, 0x44, 0x72, 0x4C, 0x41].map(|byte| (byte, true));

@@ -196,7 +196,7 @@ fn every_byte_is_a_sync_byte_or_breaks_a_rule() {
         }
         counts[class] += 1;
     }
-    // T = 1..7 without and 2..7 with process data behind an address; T = 0 too behind a short one.
+    // T = 1..7 without and 2..7 with process data after an address; T = 0 too behind a short one.
     assert_eq!(counts, [1, 1, 128 + 64 + 16, 5, 13, 28]);
 }
 

@@ -302,7 +302,7 @@ impl Telegram {
         short
     }
 
-    /// The telegram at the begin of some octets. A reason is given at the first octet that settles it; octets behind the telegram are not read.
+    /// The telegram at the begin of some octets. A reason is given at the first octet that settles it; octets after the telegram are not read.
     #[must_use]
     pub fn decode(octets: &[u8]) -> Decoded<Self, Reason> {
         let bad = |reason, offset| Decoded::Bad { reason, offset };

@@ -403,7 +403,7 @@ fn hold(function: Function, course: Course, orders: &mut Orders, cells: &Cells) 
     orders.analogue_torque = cells.byte(ram::SW_VERSION2) & sw_version2::NO_ANALOGUE_TORQUE == 0;
 }
 
-/// Counts a bit of a transmission in `BZ`; behind the last one the next transmission begins.
+/// Counts a bit of a transmission in `BZ`; after the last one the next transmission begins.
 fn count(bits: u8, cells: &mut Cells) -> u8 {
     let before = cells.byte(ram::BZ);
     let now = if before >= bits { 1 } else { before + 1 };

@@ -2,7 +2,7 @@
 //! and the cycle control's own way to store a position, which leaves the cells of the bus alone.
 //!
 //! Choice (E124): `EE_parity` is the exclusive or of the other 255 bytes and FF. It is wrong while something is
-//! being written and put right behind it: a power failure in mid-write leaves FF where it was writing, and a
+//! being written and put right after it: a power failure in mid-write leaves FF where it was writing, and a
 //! wrong test byte.
 
 use super::properties::Nd21Properties;

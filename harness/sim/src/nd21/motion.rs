@@ -83,7 +83,7 @@ pub(super) struct Motion {
 
 /// What the caller has to know of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Moved {
+pub(super) struct MotionStep {
     /// The slip is more than `Slipping error` allows (14.5.6).
     pub(super) slipped: bool,
     /// Nothing turned and nothing changed.
@@ -149,7 +149,7 @@ impl Motion {
         outside: Outside,
         plant: &mut Plant,
         cells: &mut Cells,
-    ) -> Moved {
+    ) -> MotionStep {
         let eighths = if cells.byte(ram::SW_VERSION2) & sw_version2::TO_8000 == 0 {
             2
         } else {
@@ -196,7 +196,7 @@ impl Motion {
         }
         let torque = word(torque);
         self.show(torque, eighths, outside, cells);
-        Moved {
+        MotionStep {
             slipped,
             at_rest: at_rest
                 && plant.speed == 0.0

@@ -20,7 +20,7 @@ pub struct Drive {
     inverter: Inverter,
     /// The reply that waits, and when it begins.
     reply: Option<(Instant, Buffer)>,
-    /// Module and inverter as they were before the last telegram: an octet right behind it makes it too long (EN 1).
+    /// Module and inverter as they were before the last telegram: an octet right after it makes it too long (EN 1).
     before: Option<(Slave, Inverter)>,
     /// Whether the last octet was such a one.
     torn: bool,

@@ -32,7 +32,7 @@ struct RingPlace {
 impl RingPlace {
     /// What becomes of the place, and what it sends on, up to and including `until`. `sent` is what the place before it sends; the
     /// master's receiver sends on what it hears.
-    fn take(&mut self, sent: &Carried, until: Instant) -> Carried {
+    fn take(&mut self, sent: &LinkStream, until: Instant) -> LinkStream {
         let byte_time = self.inbound.byte_time();
         self.inbound.reserve(sent.bytes.len());
         let mut bytes = sent.bytes.iter();
@@ -44,14 +44,14 @@ impl RingPlace {
             }
         }
         let Some(node) = &mut self.node else {
-            return Carried::heard(self.inbound.take_until(until));
+            return LinkStream::heard(self.inbound.take_until(until));
         };
         let mut outbound = Link::free_from(byte_time, self.line_free);
         outbound.reserve(sent.bytes.len() + 1);
         node.run(&mut self.inbound, &mut outbound, until);
         self.inbound.forget_arrived();
         self.line_free = outbound.line_free();
-        Carried::sent(outbound.under_way(), byte_time)
+        LinkStream::sent(outbound.under_way(), byte_time)
     }
 }
 
@@ -66,7 +66,7 @@ struct Run {
 
 /// What a place sends, or what the master hears.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-struct Carried {
+struct LinkStream {
     bytes: Vec<u8>,
     /// When they are sent; no part of what the master hears.
     runs: Vec<Run>,
@@ -74,7 +74,7 @@ struct Carried {
     errors: Vec<(usize, LineError)>,
 }
 
-impl Carried {
+impl LinkStream {
     fn sent(all: &[UnderWay], byte_time: Span) -> Self {
         let mut carried = Self {
             bytes: Vec::with_capacity(all.len()),
@@ -132,7 +132,7 @@ pub struct SentStream(u32);
 
 /// What a place became, and what it sent meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Became {
+pub struct PlaceStep {
     /// The state of the place.
     place: PlaceState,
     /// What it sent.
@@ -187,14 +187,14 @@ impl Passage {
 
 /// What was met, each with the number by which it is called.
 #[derive(Clone, Debug)]
-struct Met<T> {
+struct Numbered<T> {
     /// The last one with a hash.
     last: HashMap<u64, u32, Mixing>,
     /// Each with its hash and the one before it that has the same hash.
     all: Vec<(Box<T>, u64, Option<u32>)>,
 }
 
-impl<T> Default for Met<T> {
+impl<T> Default for Numbered<T> {
     fn default() -> Self {
         Self {
             last: HashMap::default(),
@@ -203,7 +203,7 @@ impl<T> Default for Met<T> {
     }
 }
 
-impl<T: Hash + Eq> Met<T> {
+impl<T: Hash + Eq> Numbered<T> {
     fn number(&mut self, value: T) -> u32 {
         let hash = Mixing::default().hash_one(&value);
         let last = self.last.get(&hash).copied();
@@ -280,11 +280,11 @@ pub struct MetSoFar {
 pub struct SharedRing {
     byte_time: Span,
     /// Places without the bytes on their links.
-    places: Met<RingPlace>,
-    under_way: Met<Vec<UnderWay>>,
-    streams: Met<Carried>,
+    places: Numbered<RingPlace>,
+    under_way: Numbered<Vec<UnderWay>>,
+    streams: Numbered<LinkStream>,
     /// What a place makes of a stream up to a time.
-    steps: Made<(PlaceState, SentStream, Instant), Became>,
+    steps: Made<(PlaceState, SentStream, Instant), PlaceStep>,
 }
 
 impl SharedRing {
@@ -295,9 +295,9 @@ impl SharedRing {
         let (links, nodes) = ring.at_rest()?;
         let mut shared = Self {
             byte_time: ring.byte_time(),
-            places: Met::default(),
-            under_way: Met::default(),
-            streams: Met::default(),
+            places: Numbered::default(),
+            under_way: Numbered::default(),
+            streams: Numbered::default(),
             steps: Made::default(),
         };
         let mut places = Vec::with_capacity(links.len());
@@ -342,7 +342,7 @@ impl SharedRing {
     }
 
     /// What a place in this state becomes when the place before it sends this stream.
-    fn step(&mut self, place: PlaceState, stream: SentStream, until: Instant) -> Became {
+    fn step(&mut self, place: PlaceState, stream: SentStream, until: Instant) -> PlaceStep {
         if let Some(became) = self.steps.of.get(&(place, stream, until)) {
             return *became;
         }
@@ -352,9 +352,9 @@ impl SharedRing {
         became
     }
 
-    fn work(&mut self, mut place: RingPlace, stream: SentStream, until: Instant) -> Became {
+    fn work(&mut self, mut place: RingPlace, stream: SentStream, until: Instant) -> PlaceStep {
         let sent = place.take(self.streams.get(stream.0), until);
-        Became {
+        PlaceStep {
             place: self.met(place),
             sent: SentStream(self.streams.number(sent)),
         }
@@ -362,7 +362,7 @@ impl SharedRing {
 
     /// Lets the master send these bytes without a gap and without a fault, up to the time at which the last one has been sent.
     pub fn send(&mut self, before: &SharedState, bytes: &[u8]) -> Passage {
-        let sent = Carried {
+        let sent = LinkStream {
             bytes: bytes.to_vec(),
             runs: vec![Run {
                 start: before.now,
@@ -398,7 +398,7 @@ impl SharedRing {
         passage: &Passage,
         link: usize,
         faults: impl IntoIterator<Item = (u64, LinkFault)>,
-    ) -> Option<Became> {
+    ) -> Option<PlaceStep> {
         let mut place = self.place(*before.places.get(link)?);
         for (byte, fault) in faults {
             place.inbound.arm(byte, fault);
@@ -414,7 +414,7 @@ impl SharedRing {
         before: &SharedState,
         passage: &Passage,
         link: usize,
-        became: Became,
+        became: PlaceStep,
     ) -> Passage {
         let until = passage.after.now;
         let mut passage = passage.clone();

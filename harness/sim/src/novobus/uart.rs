@@ -14,7 +14,7 @@ pub(crate) const BITS: u64 = 11;
 pub(crate) struct Uart {
     /// The bit before: a start bit is a 0 behind a 1.
     last: bool,
-    /// The bits read of a byte behind its start bit, the first one lowest, and how many; `None` between bytes.
+    /// The bits read of a byte after its start bit, the first one lowest, and how many; `None` between bytes.
     reading: Option<(u16, u32)>,
 }
 

@@ -16,7 +16,7 @@ pub struct LineHost {
 }
 
 impl LineHost {
-    /// Puts a telegram behind the others, to be sent as `wish` says.
+    /// Puts a telegram after the others, to be sent as `wish` says.
     pub fn send(&mut self, wish: Wish, octets: Vec<Octet>) {
         self.queue.push_back((wish, octets));
     }

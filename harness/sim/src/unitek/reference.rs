@@ -451,7 +451,7 @@ impl Reference {
         out
     }
 
-    /// Whether a cycle of `t` ms sends, `gone` ms behind its request.
+    /// Whether a cycle of `t` ms sends, `gone` ms after its request.
     fn is_due(&self, gone: u64, t: u64) -> bool {
         if t == 1 || self.p.interval_accuracy.word() == "exact" {
             return gone.is_multiple_of(t);

@@ -42,7 +42,7 @@ pub(crate) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
             let last = bytes.len() - 1;
             // The checking byte as often as all others together.
             for at in (1..=last).chain(vec![last; last - 1]) {
-                let wrong = wrong_byte(bytes[at], (round, at == last), dice);
+                let wrong = wrong_byte(bytes[at], round, at == last, dice);
                 let held = [RawCommand::WriteWord {
                     cell: cell & !1,
                     data: dice.word(),
@@ -57,7 +57,7 @@ pub(crate) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
     tour.packed(shuffled(groups, dice))
 }
 
-fn wrong_byte(right: u8, (round, check): (u8, bool), dice: &mut Dice) -> u8 {
+fn wrong_byte(right: u8, round: u8, check: bool, dice: &mut Dice) -> u8 {
     let wrong = match (round, check) {
         (0, true) => right.wrapping_add(1),
         (1, true) => right.wrapping_neg(),
@@ -99,7 +99,7 @@ fn between_error_and_recovery(tour: &Tour<'_>, dice: &mut Dice) -> Vec<Act> {
     }
 }
 
-/// Every byte that is no command (9.5), with what would be right behind commands of each form.
+/// Every byte that is no command (9.5), with what would be right after commands of each form.
 pub(crate) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let unknown = (0..=u8::MAX).filter(|code| layout(*code, ReadLongAnswer::FourData).is_none());
     let forms = unknown.flat_map(|code| [(code, 0), (code, 1), (code, 2)]);

@@ -99,7 +99,7 @@ pub(crate) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
     tour.packed(groups)
 }
 
-/// Process data with and without commands, in and out of the same cells and of others, of telegrams behind one another (9.4, 14.10.3).
+/// Process data with and without commands, in and out of the same cells and of others, of telegrams after one another (9.4, 14.10.3).
 pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut cases = Vec::new();
     for round in 0..24_u16 {

@@ -88,7 +88,7 @@ const SETTINGS: [(&str, Word); 18] = [
 ];
 
 #[derive(Clone, Copy)]
-enum Held {
+enum ConditionWord {
     Memory,
     In,
     Not,
@@ -103,18 +103,18 @@ enum Held {
 }
 
 /// What can hold, beside the cells.
-const CONDITIONS: [(&str, Held); 11] = [
-    ("memory", Held::Memory),
-    ("in", Held::In),
-    ("not", Held::Not),
-    ("normal", Held::Normal),
-    ("GPO1", Held::Gpo1),
-    ("GPO2", Held::Gpo2),
-    ("ready", Held::Ready),
-    ("analogue-output", Held::AnalogueOutput),
-    ("encoder", Held::Encoder),
-    ("display", Held::Display),
-    ("mode", Held::Mode),
+const CONDITIONS: [(&str, ConditionWord); 11] = [
+    ("memory", ConditionWord::Memory),
+    ("in", ConditionWord::In),
+    ("not", ConditionWord::Not),
+    ("normal", ConditionWord::Normal),
+    ("GPO1", ConditionWord::Gpo1),
+    ("GPO2", ConditionWord::Gpo2),
+    ("ready", ConditionWord::Ready),
+    ("analogue-output", ConditionWord::AnalogueOutput),
+    ("encoder", ConditionWord::Encoder),
+    ("display", ConditionWord::Display),
+    ("mode", ConditionWord::Mode),
 ];
 
 /// Reads the text after `drive`.
@@ -332,9 +332,9 @@ fn condition(scanner: &mut Scanner<'_>, others: &[&'static str]) -> Result<Condi
     Err(problem.did_you_mean(found, &names))
 }
 
-fn held_condition(held: Held, scanner: &mut Scanner<'_>) -> Result<Condition, Problem> {
+fn held_condition(held: ConditionWord, scanner: &mut Scanner<'_>) -> Result<Condition, Problem> {
     let showing = match held {
-        Held::Memory => {
+        ConditionWord::Memory => {
             let place = place(scanner)?;
             if scanner.clone().eat("&") {
                 return Ok(Condition::Cell(cell_check(scanner, place)?));
@@ -342,27 +342,27 @@ fn held_condition(held: Held, scanner: &mut Scanner<'_>) -> Result<Condition, Pr
             equals(scanner)?;
             return Ok(Condition::Memory(place, bytes(scanner)?));
         }
-        Held::Normal => return Ok(Condition::InError(false)),
-        Held::In => {
+        ConditionWord::Normal => return Ok(Condition::InError(false)),
+        ConditionWord::In => {
             required(scanner, &["error"])?;
             return Ok(Condition::InError(true));
         }
-        Held::Not => {
+        ConditionWord::Not => {
             required(scanner, &["in"])?;
             required(scanner, &["error"])?;
             return Ok(Condition::InError(false));
         }
-        Held::Gpo1 => Showing::Gpo1(either(scanner, ["low", "high"])?),
-        Held::Gpo2 => Showing::Gpo2(either(scanner, ["low", "high"])?),
-        Held::Ready => Showing::Ready(either(scanner, ["open", "closed"])?),
-        Held::AnalogueOutput => {
+        ConditionWord::Gpo1 => Showing::Gpo1(either(scanner, ["low", "high"])?),
+        ConditionWord::Gpo2 => Showing::Gpo2(either(scanner, ["low", "high"])?),
+        ConditionWord::Ready => Showing::Ready(either(scanner, ["open", "closed"])?),
+        ConditionWord::AnalogueOutput => {
             equals(scanner)?;
             let voltage = quantity::quantity(scanner, Some(Dimension::Voltage))?;
             let millivolts = voltage.whole(1_000, -20, 20)?;
             let tolerance = quantity::tolerance(scanner, Dimension::Voltage)?;
             Showing::Analogue(millivolts, voltage, tolerance)
         }
-        Held::Encoder => {
+        ConditionWord::Encoder => {
             equals(scanner)?;
             let count = signed(scanner)?;
             let off = if quantity::plus_minus(scanner) {
@@ -372,8 +372,8 @@ fn held_condition(held: Held, scanner: &mut Scanner<'_>) -> Result<Condition, Pr
             };
             Showing::Encoder(count, off)
         }
-        Held::Display => Showing::Display(display(scanner)?),
-        Held::Mode => Showing::Mode(named(scanner, &Mode::NAMES, "a mode (ND21 11.8)")?),
+        ConditionWord::Display => Showing::Display(display(scanner)?),
+        ConditionWord::Mode => Showing::Mode(named(scanner, &Mode::NAMES, "a mode (ND21 11.8)")?),
     };
     Ok(Condition::Shows(showing))
 }

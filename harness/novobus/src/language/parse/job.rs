@@ -9,7 +9,7 @@ use harness_bench::scenario::pattern::{self, Pattern};
 use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
 
-/// What stands behind a job's name.
+/// What follows a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Form {
     pub(crate) name: &'static str,

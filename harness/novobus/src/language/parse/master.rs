@@ -28,7 +28,7 @@ const CALLS: [&str; 11] = [
 /// Maximum number of jobs in one line.
 const MOST_CALLS: usize = 64;
 
-/// Reads what stands behind `master`: one call, or several behind semicolons that go out together.
+/// Reads what follows `master`: one call, or several behind semicolons that go out together.
 pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let once = scanner.eat_word("once");
     let mut ahead = scanner.clone();

@@ -18,7 +18,7 @@ use harness_sim::fault::{DriveFault, Flips};
 /// Words with which steps begin that are no jobs.
 pub(crate) const WORDS: [&str; 3] = ["drive", "until", "record"];
 
-/// Reads what stands behind the opening of a step; `None` if there is no such word.
+/// Reads what follows the opening of a step; `None` if there is no such word.
 pub(crate) fn step(
     opening: Opening<'_>,
     scanner: &mut Scanner<'_>,

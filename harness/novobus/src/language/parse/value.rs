@@ -14,7 +14,7 @@ use harness_proto::nd21::units::Scale;
 /// Another name of `umdrist` and what stands behind it: the actual position.
 const POSITION: (&str, &str) = ("position", "umdrist");
 
-/// What may stand behind a value.
+/// What may follow a value.
 const BEHIND: [&str; 3] = ["+-", "±", "within"];
 
 /// Every name of a RAM cell.
@@ -149,7 +149,7 @@ pub(crate) fn assigned(scanner: &mut Scanner<'_>, place: &CellPlace) -> Result<W
     value(scanner, place.scale(), place)
 }
 
-/// Bytes up to what may stand behind a value.
+/// Bytes up to what may follow a value.
 pub(crate) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
     let mut part = scanner.before(&BEHIND);
     let bytes = pattern::pattern(&mut part)?;
@@ -227,7 +227,7 @@ pub(crate) fn tolerance(
     Ok(None)
 }
 
-/// What stands behind a cell's name in a check: `= 1500rpm +-1%`, `& E0 = 00`, `< 100rpm`.
+/// What follows a cell's name in a check: `= 1500rpm +-1%`, `& E0 = 00`, `< 100rpm`.
 pub(crate) fn cell_check(
     scanner: &mut Scanner<'_>,
     place: CellPlace,

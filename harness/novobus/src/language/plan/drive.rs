@@ -216,12 +216,12 @@ impl Planner {
 
 /// Records that run, by ring, drive and address, and how many there were.
 #[derive(Debug, Default)]
-pub(crate) struct Running {
+pub(crate) struct RunningRecords {
     cells: BTreeSet<(usize, u8, u16)>,
     records: usize,
 }
 
-impl Running {
+impl RunningRecords {
     /// What does not run cannot be ended, and a report has an end too.
     pub(crate) fn take(&mut self, record: &PlannedRecord) -> Result<(), Problem> {
         for drive in record.drives.clone() {

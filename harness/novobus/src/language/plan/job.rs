@@ -351,7 +351,7 @@ fn expected_answer(
     expected
 }
 
-/// Where in the whole answer the data bytes stand, behind the sync byte and the address byte.
+/// Where in the whole answer the data bytes stand, after the sync byte and the address byte.
 fn data_places(command: &Command, width: usize, form: ReadLongAnswer) -> Vec<usize> {
     let replies: Vec<_> = command.answer_form(form).into_iter().collect();
     let place = |n: usize| {

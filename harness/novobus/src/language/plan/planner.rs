@@ -1,6 +1,6 @@
 //! Settles a scenario, line by line.
 
-use super::drive::Running;
+use super::drive::RunningRecords;
 use super::setup::model_unless_said;
 use super::types::{PlannedBench, PlannedCheck, RingAct};
 use crate::language::Novobus;
@@ -95,7 +95,7 @@ pub(crate) fn settle(
         },
         model: model_unless_said(scenario),
         scope: Scope::default(),
-        running: Running::default(),
+        running: RunningRecords::default(),
     };
     found.extend(planner.set_up(&header.setups));
     Ok(planner)
@@ -108,7 +108,7 @@ pub(crate) fn resume(bench: &PlannedBench) -> Planner {
         // The model of every drive is settled.
         model: Model::default(),
         scope: Scope::default(),
-        running: Running::default(),
+        running: RunningRecords::default(),
     }
 }
 
@@ -120,7 +120,7 @@ pub struct Planner {
     pub(crate) model: Model,
     /// The counters of the loops around the step in hand.
     pub(crate) scope: Scope,
-    running: Running,
+    running: RunningRecords,
 }
 
 impl Deref for Planner {

@@ -72,7 +72,7 @@ pub(crate) fn check(
             "{} check sequences came back, expected {times}",
             runner.own.corrected
         )),
-        PlannedCheck::Named(ring, link, broken) => named(runner, (*ring, *link), *broken, span),
+        PlannedCheck::Named(ring, link, broken) => named(runner, *ring, *link, *broken, span),
         PlannedCheck::Ended(ending) => all_ended(runner, *ending, span),
         PlannedCheck::RulesKept(ring) => super::master::rules_kept(runner, *ring, span),
         PlannedCheck::Sent(bytes, time) => {
@@ -128,7 +128,8 @@ fn all_ended(runner: &Runner<'_>, ending: Ending, span: TextSpan) -> Result<(), 
 /// Whether the driver said first that this link is broken, or damages bytes.
 fn named(
     runner: &Runner<'_>,
-    (ring, link): (usize, usize),
+    ring: usize,
+    link: usize,
     broken: bool,
     span: TextSpan,
 ) -> Result<(), Stop> {

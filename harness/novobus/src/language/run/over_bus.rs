@@ -70,7 +70,7 @@ pub(crate) fn asking_time(runner: &Runner<'_>, check: &PlannedDriveCheck) -> Spa
 }
 
 /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
-/// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
+/// answer stays unseen, and nothing is asked in the middle of a telegram or after an error.
 pub(crate) fn ask_for(runner: &mut Runner<'_>, check: &PlannedDriveCheck) {
     if matches!(check.condition, PlannedCondition::InError(_)) {
         super::tapped::tap(runner, check.ring, check.drives.clone());
@@ -437,7 +437,7 @@ fn close(link: &mut dyn Link, cell: Before) -> Result<(), NotReady> {
     }
 }
 
-/// Resets a drive, and returns whether the ring passes bytes right behind it. A drive that gives no answer is asked once more when the ring
+/// Resets a drive, and returns whether the ring passes bytes right after it. A drive that gives no answer is asked once more when the ring
 /// passes bytes.
 fn reset_one(link: &mut dyn Link, cell: Before) -> Result<bool, NotReady> {
     let reset =

@@ -30,7 +30,7 @@ const NAMED: usize = 6;
 /// What is kept of one ring.
 #[derive(Default)]
 pub(crate) struct RingState {
-    /// The first byte behind the last check sequence that came back.
+    /// The first byte after the last check sequence that came back.
     pub(crate) since_recovery: usize,
     /// What was sent, and whether no fault was put on it at the master's end.
     pub(crate) sent: Vec<(u8, bool)>,

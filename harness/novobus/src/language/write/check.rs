@@ -4,7 +4,7 @@ use super::{cell, drives, link, named, which_ring};
 use crate::language::syntax::{CellRecording, Check, Condition, DriveCheck, Looks, Showing};
 use harness_sim::nd21::Mode;
 
-/// What stands behind `?`.
+/// What follows `?`.
 pub(crate) fn check(check: &Check) -> String {
     match check {
         Check::Located { drive, within } => {

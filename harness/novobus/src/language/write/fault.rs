@@ -4,7 +4,7 @@ use super::{link, ring_prefix};
 use crate::language::syntax::{FaultKind, FaultStep, LinkFaultKind};
 use harness_sim::fault::LinkFault;
 
-/// What stands behind `!`: `98->97 byte 10: flip 0`, `drive 3 @20ms: off`.
+/// What follows `!`: `98->97 byte 10: flip 0`, `drive 3 @20ms: off`.
 pub(crate) fn fault(fault: &FaultStep) -> String {
     let place = match (&fault.byte, fault.at) {
         (Some(byte), _) => format!(" byte {byte}"),

@@ -23,12 +23,10 @@ pub(crate) fn job(job: &JobStep) -> String {
             place,
             data,
             tolerance,
-        } => command(
-            *kind,
-            drive,
-            (place.as_ref(), data.as_ref()),
-            tolerance.as_ref(),
-        ),
+        } => {
+            let (place, data) = (place.as_ref(), data.as_ref());
+            command(*kind, drive, place, data, tolerance.as_ref())
+        }
         JobStep::Master { calls, once } => {
             let calls = calls.iter().map(|(drive, asked)| call(drive, asked));
             let calls: Vec<_> = calls.collect();
@@ -47,7 +45,8 @@ fn exchange(drive: &DriveRange, send: &Pattern, receive: Option<&Pattern>) -> St
 fn command(
     kind: JobKind,
     drive: &DriveRange,
-    (place, data): (Option<&CellPlace>, Option<&Written>),
+    place: Option<&CellPlace>,
+    data: Option<&Written>,
     tolerance: Option<&Tolerance>,
 ) -> String {
     let form = FORMS.iter().find(|form| form.kind == kind);
@@ -76,7 +75,7 @@ fn call(drive: &DriveRange, call: &MasterCall) -> String {
     };
     match call {
         MasterCall::Command(kind, place, data) => {
-            command(*kind, drive, (place.as_ref(), data.as_ref()), None)
+            command(*kind, drive, place.as_ref(), data.as_ref(), None)
         }
         MasterCall::ReadEeprom(place, data) => eeprom("read-eeprom", place, data.as_ref()),
         MasterCall::WriteEeprom(place, data) => eeprom("write-eeprom", place, Some(data)),

@@ -19,7 +19,7 @@ fn ring_and_reference_agree() {
     assert!(campaign.pool().cases().len() > 100);
 }
 
-/// Deviations that need two telegrams, one behind the other, are found from a fixed seed.
+/// Deviations that need two telegrams, one after the other, are found from a fixed seed.
 #[test]
 fn two_telegrams_are_found() {
     for (name, most) in [

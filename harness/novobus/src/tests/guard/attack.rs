@@ -62,7 +62,7 @@ fn command() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// Commands cut over telegrams: each piece behind a sync byte of one kind or another.
+/// Commands cut over telegrams: each piece after a sync byte of one kind or another.
 fn telegrams() -> impl Strategy<Value = Vec<u8>> {
     let pieces = vec(
         (1..8_usize, 0..8_u8, 0xF8..=0xFF_u8, any::<[u8; 2]>()),

@@ -271,7 +271,7 @@ fn after_a_denial() {
     assert!(line.trouble().is_some());
 }
 
-/// ND21 9.9: where time-outs may be monitored, a recovery behind a silence waits until 40 ms are over; it may end a telegram that was begun behind
+/// ND21 9.9: where time-outs may be monitored, a recovery after a silence waits until 40 ms are over; it may end a telegram that was begun behind
 /// the silence too. None is denied.
 #[test]
 fn a_recovery_behind_a_silence_waits() {

@@ -273,7 +273,7 @@ fn troubles() -> [(Trouble, Verdict); 5] {
 const PLACES: &[(&str, When)] = &[
     // With the last byte, which no line waits for.
     ("> 80 80\n", When::Sent(2)),
-    // While the last bytes come round, behind the last step.
+    // While the last bytes come round, after the last step.
     ("> 80 80\n", When::Received(1)),
     // At a step that lets no time pass.
     ("> 80\n< 80\n? received 1 bytes\n", When::Received(1)),
@@ -298,7 +298,7 @@ fn trouble_ends_an_attempt_wherever_it_comes() {
     }
 }
 
-/// The cells of a header are set before the first step and set back behind the last one.
+/// The cells of a header are set before the first step and set back after the last one.
 #[test]
 fn trouble_around_the_steps_ends_the_attempt_too() {
     let text = "ring 2\ndrive 1 memory FE10 = 11\n> 80\n< 80\n";

@@ -63,7 +63,7 @@ fn a_header_resets_no_drive() {
     ));
 }
 
-/// ND21 9.7: a drive with another sum sends the same zeros before it begins to add, behind FF too, which with 1 is 00.
+/// ND21 9.7: a drive with another sum sends the same zeros before it begins to add, after FF too, which with 1 is 00.
 #[test]
 fn a_zero_of_the_error_mode_is_no_sum() {
     for (deviation, sum) in [

@@ -542,7 +542,7 @@ fn regressions() {
         None,
     );
     refused(&steps("write-io 0 = xx"), "xx", "must be known", None);
-    // SYNCO behind the seven zeros of a telegram is not drive 128.
+    // SYNCO after the seven zeros of a telegram is not drive 128.
     fails(
         "title x\nring 200\n> 8E 05 00*7\n> 80*10\n? located 128\n",
         "no address",

@@ -62,7 +62,7 @@ impl Served {
         });
         let setup = "drive 0..last model plain\n";
         Self {
-            rings: ServedRings::start((setup, &[4]), transport, marks, roles.collect()),
+            rings: ServedRings::start(setup, &[4], transport, marks, roles.collect()),
             marks,
         }
     }

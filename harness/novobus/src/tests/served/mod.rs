@@ -19,12 +19,7 @@ struct ServedRings {
 
 impl ServedRings {
     /// Serves rings of these sizes with this setup over `tcp` or `pty`, and links between their stations.
-    fn start(
-        (setup, sizes): (&str, &[u8]),
-        transport: &str,
-        marks: bool,
-        inner: Vec<Inner>,
-    ) -> Self {
+    fn start(setup: &str, sizes: &[u8], transport: &str, marks: bool, inner: Vec<Inner>) -> Self {
         let source = Source::from_bytes("setup".to_owned(), setup.into()).expect("a text");
         let (plan, link) = simulated(&source, Some(sizes)).expect("a setup");
         let marks = match marks {

@@ -105,7 +105,7 @@ fn all_that_fit(transport: &str, marks: bool, largest: u8, longest: Span) -> usi
                 _ => format!("drive {ring}0..last input GPIN3 GPIN5 high\n"),
             })
             .collect();
-        let served = ServedRings::start((&setup, &sizes), transport, marks, Vec::new());
+        let served = ServedRings::start(&setup, &sizes, transport, marks, Vec::new());
         let mut link = link(&served, &sizes, marks);
         for entry in entries
             .into_iter()

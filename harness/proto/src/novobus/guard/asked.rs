@@ -1,7 +1,7 @@
 //! Commands that were sent and are not answered yet: an answer has half of its address (ND21 10.1), so it is read beside its command.
 
 use super::effect::DriveAct;
-use super::known::Known;
+use super::known::KnownDrive;
 use super::limits::Limits;
 use crate::nd21::ram;
 use alloc::collections::VecDeque;
@@ -11,7 +11,7 @@ const MOST: usize = 4_096;
 
 /// Commands in the order in which they were sent.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Asked(VecDeque<Command>);
+pub(super) struct SentCommands(VecDeque<Command>);
 
 #[derive(Clone, Copy, Debug)]
 struct Command {
@@ -21,13 +21,13 @@ struct Command {
     reads: u32,
 }
 
-impl Asked {
+impl SentCommands {
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 
     /// A command was sent to the drive of this address byte. False where more are not answered than are kept.
-    pub(super) fn sent(&mut self, address: u8, act: DriveAct, known: &Known) -> bool {
+    pub(super) fn sent(&mut self, address: u8, act: DriveAct, known: &KnownDrive) -> bool {
         let reads = known.eeprom.reads();
         self.0.push_back(Command {
             address,
@@ -42,7 +42,8 @@ impl Asked {
         &mut self,
         address: u8,
         answer: &[u8],
-        (known, limits): (&mut Known, &Limits),
+        known: &mut KnownDrive,
+        limits: &Limits,
     ) -> bool {
         let Some(command) = self.0.pop_front() else {
             return false;

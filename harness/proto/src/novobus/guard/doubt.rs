@@ -18,7 +18,7 @@ pub(super) struct Doubt {
     pub(super) matched: u8,
     /// It began with a bad sync byte, while every drive waited for a sync byte: every drive is in the error mode.
     pub(super) in_error_mode: bool,
-    /// Other bytes that may still pass: behind 17 zeros every drive in the error mode waits for the check sequence.
+    /// Other bytes that may still pass: after 17 zeros every drive in the error mode waits for the check sequence.
     pub(super) foreign: u8,
     /// It began with `ResetH8`.
     pub(super) behind_reset: bool,

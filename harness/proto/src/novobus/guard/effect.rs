@@ -1,7 +1,7 @@
 //! What a command does to a machine: judged by the cells that it writes ([`table`](super::table)).
 
 use super::denial::Cause;
-use super::known::{Facts, Known, within};
+use super::known::{Facts, KnownDrive, within};
 use super::limits::{Limits, Need};
 use super::table::{Pace, of_cell, of_stored};
 use crate::nd21::bits::{flags2, ps_status, selftest, status};
@@ -70,7 +70,7 @@ const fn effect(need: Need, pace: Pace) -> Effect {
 }
 
 /// The effect of a changed byte; cells whose meaning depends on the data come first, the table has the others.
-fn of_byte(address: u16, change: Change, known: &Known) -> Effect {
+fn of_byte(address: u16, change: Change, known: &KnownDrive) -> Effect {
     match address {
         ram::STATUS => of_status(change),
         ram::FLAGS2 => of_flags2(change),
@@ -113,7 +113,7 @@ const NSOLL_LOW: u8 = (ram::NSOLL & 0xFF) as u8;
 fn of_process_data(address: u16) -> Need {
     let any_byte = |address: u16| {
         let values =
-            (0..=u8::MAX).map(|data| of_byte(address, Change::Set(data), &Known::default()));
+            (0..=u8::MAX).map(|data| of_byte(address, Change::Set(data), &KnownDrive::default()));
         values.fold(Need::MOTION, |need, effect| need.and(effect.need))
     };
     match [address, address.wrapping_add(1)] {
@@ -194,7 +194,7 @@ fn of_ps_status(change: Change) -> Effect {
 const EEPROM_READ: u8 = 0x81;
 
 /// A command to the EEPROM controller (14.10.5).
-fn of_eeprom(command: u8, known: &Known) -> Effect {
+fn of_eeprom(command: u8, known: &KnownDrive) -> Effect {
     match command {
         // Read a byte, and the end of it.
         EEPROM_READ | 0x10 => effect(Need::NONE, Pace::Same),
@@ -218,7 +218,7 @@ fn of_eeprom(command: u8, known: &Known) -> Effect {
 }
 
 /// What is known of a drive behind a changed byte.
-fn note_byte(address: u16, change: Change, known: &mut Known) {
+fn note_byte(address: u16, change: Change, known: &mut KnownDrive) {
     match (address, change) {
         // It has passed, so that process data may be written there.
         (ram::DATA_IN, Change::Set(_)) => known.note(Facts::DATA_IN),
@@ -239,7 +239,7 @@ impl DriveAct {
     /// What it needs of a rig, where nothing is known of the drives.
     #[must_use]
     pub fn need(self) -> Need {
-        self.effects(&Known::default())
+        self.effects(&KnownDrive::default())
             .iter()
             .flatten()
             .fold(self.own_need(), |need, effect| need.and(effect.need))
@@ -248,7 +248,7 @@ impl DriveAct {
     /// Whether these limits let it pass, where nothing is known of the drives.
     #[must_use]
     pub fn passes(self, limits: &Limits) -> bool {
-        self.judge(limits, &Known::default()).is_ok()
+        self.judge(limits, &KnownDrive::default()).is_ok()
     }
 
     /// What it needs beside what the cells need that it writes.
@@ -285,7 +285,7 @@ impl DriveAct {
     }
 
     /// The effect of each byte that it changes.
-    fn effects(self, known: &Known) -> [Option<Effect>; 2] {
+    fn effects(self, known: &KnownDrive) -> [Option<Effect>; 2] {
         match self {
             // 14.5.3.1: the nominal speed 0.
             Self::WriteWord(ram::NSOLL, 0) => [None, None],
@@ -316,7 +316,7 @@ impl DriveAct {
     }
 
     /// Whether a drive of which this is known may be given it.
-    pub(super) fn judge(self, limits: &Limits, known: &Known) -> Result<(), Cause> {
+    pub(super) fn judge(self, limits: &Limits, known: &KnownDrive) -> Result<(), Cause> {
         let effects = self.effects(known);
         let need = effects.iter().flatten();
         let need = need.fold(self.own_need(), |need, effect| need.and(effect.need));
@@ -394,7 +394,7 @@ impl DriveAct {
     }
 
     /// What is known of a drive behind it.
-    pub(super) fn note(self, known: &mut Known) {
+    pub(super) fn note(self, known: &mut KnownDrive) {
         if let (Self::WriteWord(address, _), Some(_)) = (self, self.speed()) {
             known.note(match address {
                 ram::NSOLL => Facts::NSOLL,

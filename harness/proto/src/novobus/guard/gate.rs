@@ -1,12 +1,12 @@
 //! The guard itself: takes bytes and permits or denies each one.
 
 use super::FIRST_ADDRESS;
-use super::asked::Asked;
+use super::asked::SentCommands;
 use super::denial::{Cause, Denial};
 use super::doubt::Doubt;
 use super::effect::DriveAct;
 use super::half::{Half, length};
-use super::known::{Found, Known};
+use super::known::{Found, KnownDrive};
 use super::limits::Limits;
 use super::listener::Listener;
 use super::silence::Silence;
@@ -33,9 +33,9 @@ pub struct Guard {
     /// Commands received in part, by the address byte that means their drive.
     halves: Box<[Half; 256]>,
     /// What is known of each drive, by the address byte that means it.
-    known: Box<[Known; 256]>,
+    known: Box<[KnownDrive; 256]>,
     listener: Listener,
-    asked: Asked,
+    asked: SentCommands,
     silence: Silence,
     /// The last address byte, counted up by "next"; `None` where no short address is valid.
     kept: Option<u8>,
@@ -93,9 +93,9 @@ impl Guard {
             limits,
             state: State::Doubt(Doubt::default()),
             halves: Box::new([Half::default(); 256]),
-            known: Box::new([Known::default(); 256]),
+            known: Box::new([KnownDrive::default(); 256]),
             listener: Listener::new(),
-            asked: Asked::default(),
+            asked: SentCommands::default(),
             silence: Silence::new(limits.monitoring),
             kept: None,
             tails: [Tail::default(); 2],
@@ -117,8 +117,9 @@ impl Guard {
     /// Takes notice of a byte that came back.
     pub fn hear(&mut self, received: Received) {
         if let Some((key, answer)) = self.listener.hear(received, self.ring) {
-            let known = (&mut self.known[usize::from(key)], &self.limits);
-            if !self.asked.answered(key, answer.sent(), known) {
+            let known = &mut self.known[usize::from(key)];
+            let asked = &mut self.asked;
+            if !asked.answered(key, answer.sent(), known, &self.limits) {
                 self.listener.lose();
             }
         }
@@ -172,7 +173,7 @@ impl Guard {
 
     /// Forgets everything about the drives: one may have been switched off and on.
     pub fn forget(&mut self) {
-        self.known.iter_mut().for_each(Known::forget);
+        self.known.iter_mut().for_each(KnownDrive::forget);
     }
 
     /// What may have changed in the drives with these address bytes since the last call.
@@ -260,10 +261,10 @@ impl Guard {
 
     /// It is not known which of the last commands were executed.
     fn doubt_commands(&mut self) {
-        self.known.iter_mut().for_each(Known::doubt);
+        self.known.iter_mut().for_each(KnownDrive::doubt);
     }
 
-    fn known(&self, key: u8) -> &Known {
+    fn known(&self, key: u8) -> &KnownDrive {
         &self.known[usize::from(key)]
     }
 
@@ -517,7 +518,7 @@ impl Guard {
             Err(_) => return Ok(Next::to(in_doubt(byte, false))),
         };
         if header.process_data() {
-            DriveAct::ProcessDataToCome.judge(&self.limits, &Known::default())?;
+            DriveAct::ProcessDataToCome.judge(&self.limits, &KnownDrive::default())?;
         }
         let key = match (header.addressing(), self.kept) {
             (Addressing::AddressFollows, _) => return Ok(Next::to(State::Address(header))),
@@ -561,7 +562,7 @@ impl Guard {
             {
                 act.judge(&self.limits, self.known(key))?;
             }
-            // Drives whose time is up one behind the other can send 00 and 01, which complete an And or Or of this sum (ND21 9.6, 9.9).
+            // Drives whose time is up one after the other can send 00 and 01, which complete an And or Or of this sum (ND21 9.6, 9.9).
             if self.silence.may_time_out()
                 && (half.sent().len(), length) == (2, 3)
                 && Checksum::over(half.sent()) == Checksum::EMPTY

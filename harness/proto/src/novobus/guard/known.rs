@@ -123,7 +123,7 @@ impl Facts {
     /// What a referencing run needs; its last step positions (ND21 13.1.1).
     pub(super) const REFERENCING: Self =
         Self(Self::REF_V1.0 | Self::REF_V2.0 | Self::POSITIONING.0);
-    /// What is known behind a reset, if [`Self::AFTER_RESET`] was known before it.
+    /// What is known after a reset, if [`Self::AFTER_RESET`] was known before it.
     const BEHIND_RESET: Self = Self(Self::RELEASE.0 | Self::AFTER_RESET.0);
 
     /// Both.
@@ -211,14 +211,14 @@ impl Configuration {
 
 /// What is known of one drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Known {
+pub(super) struct KnownDrive {
     found: Facts,
     written: Facts,
     range: Option<SpeedRange>,
     pub(super) eeprom: EepromBuffer,
 }
 
-impl Known {
+impl KnownDrive {
     pub(super) fn knows(&self, facts: Facts) -> Facts {
         facts.without(self.found.and(self.written))
     }

@@ -23,7 +23,7 @@
 //!
 //! Drives in the error mode send what they receive plus 1 (9.7). Bytes that become FF 44 72 4C 41 by being
 //! counted up would end the error mode of the drives behind such a drive, and later bytes would reach them counted up. So this
-//! sequence, plus any number, passes only behind 17 zeros, and then only as printed.
+//! sequence, plus any number, passes only after 17 zeros, and then only as printed.
 //!
 //! If a rig has a `max_speed`, a command passes only if it cannot make a motor turn faster than that. One table (`table`) classifies each cell
 //! as harmless, as a speed, or as a way to turn faster, with its section. A speed passes as a whole word within the limit, scaled by the
@@ -34,7 +34,7 @@
 //! in which any word may be written.
 //!
 //! A drive whose time is up may keep what it receives for 10 ms, so that it does not reach the drives behind it (9.9). Where time-outs may be
-//! monitored, nothing passes in this time behind a silence in the middle of a telegram, a command or a recovery, and no recovery behind any silence
+//! monitored, nothing passes in this time after a silence in the middle of a telegram, a command or a recovery, and no recovery behind any silence
 //! (`silence`). PAUSE counts as silence, as the first drive keeps it (9.2).
 //!
 //! What comes back is read for two things only (`listener`): what `DataIn` holds, and whether the EEPROM controller has done with a read, which

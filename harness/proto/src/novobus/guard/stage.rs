@@ -7,9 +7,9 @@ pub enum Stage {
     Doubt,
     /// No drive is in the middle of a telegram, but one may be in the error mode: SYNCO, PAUSE and the check sequence pass too.
     Cleared,
-    /// The same, directly behind 17 zeros: a check sequence ends the doubt.
+    /// The same, directly after 17 zeros: a check sequence ends the doubt.
     Zeros,
-    /// Within a check sequence behind 17 zeros.
+    /// Within a check sequence after 17 zeros.
     Sequence,
     /// Within a check sequence that does not end the doubt.
     IdleSequence,

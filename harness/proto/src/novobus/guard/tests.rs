@@ -9,7 +9,7 @@ use crate::time::{Instant, Span};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A guard behind the recovery and these bytes, of which the last one may be damaged; or why one of them did not pass.
+/// A guard after the recovery and these bytes, of which the last one may be damaged; or why one of them did not pass.
 fn behind(limits: Limits, bytes: &[u8], damaged: bool) -> Result<Guard, Cause> {
     let size = RingSize::new(1).expect("1 to 250");
     let mut guard = Guard::new(size, limits);
@@ -143,7 +143,7 @@ fn next_completes_the_command_of_the_next_drive() {
 /// ND21 9.8: the check sequence makes drives forget half commands, so what follows begins a new one.
 #[test]
 fn the_recovery_forgets_half_commands() {
-    // C0 08 of a read; behind the recovery 82 begins a write.
+    // C0 08 of a read; after the recovery 82 begins a write.
     let mut bytes = [&[0x84, 0xFF, 0xC0, 0x08][..], &CHECK_SEQUENCE].concat();
     bytes.extend([0x8A, 0xFF, 0x82, 0x01, 0x08, 0xFF]);
     assert!(passes(&bytes));
@@ -255,7 +255,7 @@ fn the_reason_of_a_doubt_is_named() {
     assert_eq!(cause(reset, &[0x22, 0x88]), Some(Cause::InDoubt));
 }
 
-/// ND21 9.9: behind a silence in the middle of something nothing passes before 40 ms are over, and behind any silence no recovery; where no drive
+/// ND21 9.9: after a silence in the middle of something nothing passes before 40 ms are over, and behind any silence no recovery; where no drive
 /// monitors time-outs, everything passes at once.
 #[test]
 fn behind_a_silence() {
@@ -303,7 +303,7 @@ fn a_pause_is_silence() {
     assert_eq!([0x80, 0x81].map(passes), [true, false]);
 }
 
-/// ND21 9.6, 9.9: drives whose time is up one behind the other can send 00 and 01 behind the first two bytes of And and Or.
+/// ND21 9.6, 9.9: drives whose time is up one after the other can send 00 and 01 behind the first two bytes of And and Or.
 #[test]
 fn what_time_outs_would_complete_is_judged() {
     for part in [[0x88, 0xFF, 0xA4, 0x5C], [0x88, 0xFF, 0xA5, 0x5B]] {

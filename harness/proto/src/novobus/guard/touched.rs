@@ -1,7 +1,7 @@
 //! What commands have changed in drives that lasts: for a bench that puts it back.
 
 use super::effect::{Change, DriveAct};
-use super::known::Known;
+use super::known::KnownDrive;
 use crate::nd21::bits::flags2;
 use crate::nd21::{EE_PARAMETERS, ram};
 use crate::novobus::command::PAGE;
@@ -26,7 +26,7 @@ pub enum Touched {
 
 impl DriveAct {
     /// Hands on what it changes in a drive of which this is known.
-    pub(super) fn touches(self, known: &Known, each: &mut dyn FnMut(Touched)) {
+    pub(super) fn touches(self, known: &KnownDrive, each: &mut dyn FnMut(Touched)) {
         match self {
             Self::WriteIo(_) => each(Touched::Outputs),
             Self::Reset => each(Touched::Reset),

@@ -4,7 +4,7 @@ use super::super::sync::SYNCO;
 use super::Master;
 use super::diagnosis::Cause;
 use super::event::Event;
-use super::in_flight::{BytePlace, Composed, Owner, Slot};
+use super::in_flight::{BytePlace, ComposedByte, Owner, Slot};
 use super::job::Outcome;
 use super::recovery::Stumble;
 use crate::line::Received;
@@ -22,7 +22,7 @@ pub(super) struct Unconfirmed {
     doubt: Doubt,
 }
 
-/// Whether data wait for a byte that settles them, although one has come back right behind them.
+/// Whether data wait for a byte that settles them, although one has come back right after them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Doubt {
     #[default]
@@ -41,16 +41,16 @@ impl Unconfirmed {
 
     /// The exchange that is settled by a byte that has come back right. Behind process data the sync byte
     /// of any telegram is good enough: telegrams may follow that hold nothing else that is known.
-    fn settled_exchange(&mut self, composed: &Composed) -> Option<(u8, u16)> {
+    fn settled_exchange(&mut self, composed: &ComposedByte) -> Option<(u8, u16)> {
         let (_, value) = self.exchange?;
-        let idle = *composed == Composed::SYNCO && value.to_be_bytes()[1] == SYNCO;
+        let idle = *composed == ComposedByte::SYNCO && value.to_be_bytes()[1] == SYNCO;
         self.settle(composed, idle)
             .then(|| self.exchange.take())
             .flatten()
     }
 
     /// The read that is settled by a byte that has come back right.
-    fn settled_read(&mut self, composed: &Composed) -> Option<Slot> {
+    fn settled_read(&mut self, composed: &ComposedByte) -> Option<Slot> {
         let (slot, last) = self.read?;
         let same = composed.back == Some(last);
         self.settle(composed, same).then(|| {
@@ -59,7 +59,7 @@ impl Unconfirmed {
         })
     }
 
-    fn settle(&mut self, composed: &Composed, same: bool) -> bool {
+    fn settle(&mut self, composed: &ComposedByte, same: bool) -> bool {
         let known = composed.back.is_some_and(|back| back != 0);
         if known && same && self.doubt == Doubt::None {
             self.doubt = Doubt::Raised;
@@ -124,7 +124,7 @@ impl Master {
             return false;
         }
         if entry.is_answered() {
-            // A checking byte that is SYNCO as well may be a SYNCO behind an answer that was lost.
+            // A checking byte that is SYNCO as well may be a SYNCO after an answer that was lost.
             if entry.is_checked() && byte != SYNCO {
                 self.finish(slot);
             } else {
@@ -137,7 +137,7 @@ impl Master {
     }
 
     /// A byte has come back right: what stood before it may count.
-    fn confirm(&mut self, composed: &Composed) {
+    fn confirm(&mut self, composed: &ComposedByte) {
         if let Some((drive, value)) = self.unconfirmed.settled_exchange(composed) {
             self.episode.is_done(Stumble::Exchange(drive));
             if self.cycle.answer(drive, value) {

@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::command::Kind;
 use super::super::sync::{Addressing, MAX_NET_LENGTH, SYNCO, SyncByte, TelegramHeader};
 use super::Master;
-use super::in_flight::{BytePlace, Composed, Owner, Slot};
+use super::in_flight::{BytePlace, ComposedByte, Owner, Slot};
 use crate::time::Instant;
 
 /// Sync byte, address byte and the net bytes.
@@ -16,7 +16,7 @@ const ROOM: usize = MAX_NET_LENGTH as usize - 2;
 /// A telegram on its way out.
 #[derive(Clone, Debug)]
 pub(super) struct Outgoing {
-    bytes: [Composed; MOST_BYTES],
+    bytes: [ComposedByte; MOST_BYTES],
     length: u8,
     next: u8,
 }
@@ -24,7 +24,7 @@ pub(super) struct Outgoing {
 impl Default for Outgoing {
     fn default() -> Self {
         Self {
-            bytes: [Composed::SYNCO; MOST_BYTES],
+            bytes: [ComposedByte::SYNCO; MOST_BYTES],
             length: 0,
             next: 0,
         }
@@ -37,7 +37,7 @@ impl Outgoing {
     }
 
     #[inline]
-    pub(super) fn next(&mut self) -> Option<Composed> {
+    pub(super) fn next(&mut self) -> Option<ComposedByte> {
         if self.is_empty() {
             return None;
         }
@@ -53,7 +53,7 @@ impl Outgoing {
 
     fn push(&mut self, byte: u8, back: Option<u8>, place: BytePlace, owner: Owner) {
         if let Some(free) = self.bytes.get_mut(usize::from(self.length)) {
-            *free = Composed {
+            *free = ComposedByte {
                 byte,
                 back,
                 place,

@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::check_sequence::{SEQUENCE, ZEROS};
 use super::super::sync::{MAX_NET_LENGTH, SYNCO};
 use super::fault::{Fault, RingLink};
-use super::in_flight::{BytePlace, Sent};
+use super::in_flight::{ByteInFlight, BytePlace};
 use crate::line::Received;
 use alloc::vec::Vec;
 
@@ -45,9 +45,9 @@ pub(super) enum Spelled {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Cause {
     /// Another byte came than this one, or it was damaged.
-    Wrong(Sent),
+    Wrong(ByteInFlight),
     /// This byte did not come.
-    Missed(Sent),
+    Missed(ByteInFlight),
     /// An unexpected byte came.
     Unasked,
     /// A check sequence did not come back.
@@ -56,7 +56,7 @@ pub(super) enum Cause {
 
 impl Cause {
     /// The byte at which it began.
-    pub(super) const fn sent(&self) -> Option<&Sent> {
+    pub(super) const fn sent(&self) -> Option<&ByteInFlight> {
         match self {
             Self::Wrong(sent) | Self::Missed(sent) => Some(sent),
             Self::Unasked | Self::NotBack => None,
@@ -80,7 +80,7 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// A disturbance, with the bytes under way behind it.
-    pub(super) fn new<'a>(cause: Cause, behind: impl Iterator<Item = &'a Sent>) -> Self {
+    pub(super) fn new<'a>(cause: Cause, behind: impl Iterator<Item = &'a ByteInFlight>) -> Self {
         let all = cause
             .sent()
             .copied()
@@ -181,7 +181,7 @@ impl Evidence {
     }
 
     /// Whether the byte that was missed came after all: the computer was late, and no link was silent. Zeros are what drives send unasked
-    /// behind a silence (ND21 9.9).
+    /// after a silence (ND21 9.9).
     fn was_late(&self) -> bool {
         let missed = self.expected.first().copied().flatten();
         let came = self.received.first();

@@ -40,7 +40,7 @@ pub(super) enum BytePlace {
 
 /// A byte that has been composed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Composed {
+pub(super) struct ComposedByte {
     /// As it goes out.
     pub(super) byte: u8,
     /// As it must come back; `None` for data, and for a checking byte that depends on data.
@@ -49,7 +49,7 @@ pub(super) struct Composed {
     pub(super) owner: Owner,
 }
 
-impl Composed {
+impl ComposedByte {
     pub(super) const SYNCO: Self = Self {
         byte: SYNCO,
         back: Some(SYNCO),
@@ -60,8 +60,8 @@ impl Composed {
 
 /// A byte that has been sent.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sent {
-    pub(super) composed: Composed,
+pub(super) struct ByteInFlight {
+    pub(super) composed: ComposedByte,
     /// The byte is missed from then on.
     pub(super) due: Instant,
 }
@@ -69,7 +69,7 @@ pub(super) struct Sent {
 /// The bytes under way.
 #[derive(Clone, Debug)]
 pub(super) struct InFlight {
-    bytes: VecDeque<Sent>,
+    bytes: VecDeque<ByteInFlight>,
     most: usize,
 }
 
@@ -86,11 +86,11 @@ impl InFlight {
         self.bytes.len() >= self.most
     }
 
-    pub(super) fn push(&mut self, sent: Sent) {
+    pub(super) fn push(&mut self, sent: ByteInFlight) {
         self.bytes.push_back(sent);
     }
 
-    pub(super) fn pop(&mut self) -> Option<Sent> {
+    pub(super) fn pop(&mut self) -> Option<ByteInFlight> {
         self.bytes.pop_front()
     }
 
@@ -99,7 +99,7 @@ impl InFlight {
         self.bytes.front().map(|sent| sent.due)
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Sent> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &ByteInFlight> {
         self.bytes.iter()
     }
 

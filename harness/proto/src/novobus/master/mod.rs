@@ -48,7 +48,7 @@
 //! twice. A read that is sent again returns the value at that time.
 //!
 //! Data without a check of their own (process data, the four data bytes of `ReadLong`) count only when a
-//! byte other than 00 has come back right behind them: a drive in the error mode answers 00. Where they
+//! byte other than 00 has come back right after them: a drive in the error mode answers 00. Where they
 //! end with 80, and only SYNCO follows, a lost byte would look the same; then the drives are counted.
 //!
 //! # What cannot be detected
@@ -90,7 +90,7 @@ use compose::Outgoing;
 use cycle::Cycle;
 use diagnosis::Cause;
 use event::Events;
-use in_flight::{BytePlace, Composed, InFlight, Sent};
+use in_flight::{ByteInFlight, BytePlace, ComposedByte, InFlight};
 use recovery::{Episode, LastSequence, State};
 use store::Store;
 
@@ -283,10 +283,10 @@ impl Master {
     pub fn poll_transmit(&mut self, now: Instant) -> Option<u8> {
         let watched = match self.state {
             State::Running | State::Counting { .. } => true,
-            State::Verifying { .. } => return self.transmit(Composed::SYNCO, true, now),
+            State::Verifying { .. } => return self.transmit(ComposedByte::SYNCO, true, now),
             State::Locating { .. } => false,
             State::Resetting { next, bytes, watch } => {
-                return self.reset_byte((next, bytes), watch, now);
+                return self.reset_byte(next, bytes, watch, now);
             }
             State::Draining { .. } | State::Stopped(_) => return None,
         };
@@ -311,18 +311,18 @@ impl Master {
                 self.counters.sent += 1;
                 return Some(PAUSE);
             }
-            None => Composed::SYNCO,
+            None => ComposedByte::SYNCO,
         };
         self.transmit(composed, watched, now)
     }
 
     /// Lets a byte out; `watched`: it must come back as composed.
-    fn transmit(&mut self, composed: Composed, watched: bool, now: Instant) -> Option<u8> {
+    fn transmit(&mut self, composed: ComposedByte, watched: bool, now: Instant) -> Option<u8> {
         if watched {
             if self.in_flight.is_full() {
                 return None;
             }
-            self.in_flight.push(Sent {
+            self.in_flight.push(ByteInFlight {
                 composed,
                 due: now + self.patience,
             });
@@ -330,7 +330,7 @@ impl Master {
             evidence.expect(composed.back);
         }
         self.counters.sent += 1;
-        let idle = composed.byte == SYNCO && composed == Composed::SYNCO;
+        let idle = composed.byte == SYNCO && composed == ComposedByte::SYNCO;
         self.counters.idle += u64::from(idle);
         self.counters.telegrams += u64::from(composed.place == BytePlace::Sync && !idle);
         Some(composed.byte)
@@ -339,7 +339,8 @@ impl Master {
     /// Lets out the next byte of the check sequences.
     fn reset_byte(
         &mut self,
-        (next, bytes): (u16, u16),
+        next: u16,
+        bytes: u16,
         watch: SequenceWatch,
         now: Instant,
     ) -> Option<u8> {
@@ -392,7 +393,7 @@ impl Master {
     /// Whether a byte was sent before this master: SYNCO in front of the telegram with which it begins.
     fn is_before(&mut self, received: Received) -> bool {
         let first = self.in_flight.iter().next();
-        let before = first.is_none_or(|sent| sent.composed != Composed::SYNCO);
+        let before = first.is_none_or(|sent| sent.composed != ComposedByte::SYNCO);
         self.unheard &= before && received.is(SYNCO);
         self.unheard
     }

@@ -38,7 +38,7 @@ pub(super) enum State {
     Verifying {
         watch: SequenceWatch,
         heard: bool,
-        /// Of several sequences, SYNCO comes back behind the last one only.
+        /// Of several sequences, SYNCO comes back after the last one only.
         last: LastSequence,
         until: Instant,
     },
@@ -309,7 +309,7 @@ impl Master {
         }
     }
 
-    /// All drives are back in normal mode; the bytes sent behind the sequence come next.
+    /// All drives are back in normal mode; the bytes sent after the sequence come next.
     fn came_back(&mut self) {
         if self.episode.count || !self.episode.ran {
             self.state = State::counting();

@@ -183,7 +183,7 @@ impl Store {
         self.entries.len() - self.free.len()
     }
 
-    /// Adds a job behind the others; `None` where there is no room.
+    /// Adds a job after the others; `None` where there is no room.
     pub(super) fn add(&mut self, job: &Job, read_long: ReadLongAnswer) -> Option<JobId> {
         if self.free.is_empty() && self.entries.len() < usize::from(self.capacity) {
             self.free.push(Slot::try_from(self.entries.len()).ok()?);

@@ -2,7 +2,7 @@
 //! and what it calls a fault.
 
 use super::diagnosis::{Cause, Evidence, Spelled};
-use super::in_flight::{Composed, Sent};
+use super::in_flight::{ByteInFlight, ComposedByte};
 use super::store::Store;
 use super::*;
 use crate::novobus::address::passed_on;
@@ -244,8 +244,8 @@ fn the_store_keeps_both_orders() {
 /// ND21 9.7: at most 25 zeros, then the address; more zeros are the address of drive 0.
 #[test]
 fn an_address_is_believed_when_it_stays() {
-    let sent = Sent {
-        composed: Composed::SYNCO,
+    let sent = ByteInFlight {
+        composed: ComposedByte::SYNCO,
         due: Instant::START,
     };
     let settled = |bytes: &[u8]| {
@@ -275,8 +275,8 @@ fn an_address_is_believed_when_it_stays() {
 /// ND21 9.7, 9.9: a byte that was missed and comes after all was late. What a drive spells out behind it is a damaged byte and no silence.
 #[test]
 fn a_late_byte_is_no_silence() {
-    let sent = Sent {
-        composed: Composed::SYNCO,
+    let sent = ByteInFlight {
+        composed: ComposedByte::SYNCO,
         due: Instant::START,
     };
     let link = RingLink::into(size(3), 1);

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 /// What the gate knows of a drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Guarded {
+pub(super) struct GuardedDrive {
     /// As the rig's file names it.
     pub(super) first_rx: u16,
     pub(super) first_tx: u16,
@@ -33,7 +33,7 @@ pub(super) struct Guarded {
     pub(super) speed: Speed,
 }
 
-impl Guarded {
+impl GuardedDrive {
     pub(super) fn new((rx, tx): (u16, u16)) -> Self {
         Self {
             first_rx: rx,

@@ -21,7 +21,7 @@ use crate::can::{BitRate, Frame};
 use crate::time::{Instant, Span};
 use alloc::vec::Vec;
 use class::need;
-use drive::Guarded;
+use drive::GuardedDrive;
 
 /// What the rig's file permits.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -109,7 +109,7 @@ const EEPROM_REST: Span = Span::from_millis(60_000);
 pub struct Gate {
     limits: Limits,
     rate: BitRate,
-    drives: Vec<Guarded>,
+    drives: Vec<GuardedDrive>,
     /// Every identifier that was written to a drive: to receive, and to send.
     given: [Vec<u16>; 2],
     eeprom_at: Option<Instant>,
@@ -123,7 +123,7 @@ impl Gate {
         Self {
             limits,
             rate,
-            drives: drives.iter().copied().map(Guarded::new).collect(),
+            drives: drives.iter().copied().map(GuardedDrive::new).collect(),
             given: Default::default(),
             eeprom_at: None,
             eeprom_writes: 0,
@@ -136,7 +136,7 @@ impl Gate {
     /// [`Denial`]; the frame must not be sent, and the gate has not changed.
     pub fn admit(&mut self, now: Instant, frame: &Frame) -> Result<(), Denial> {
         let number = frame.id().number();
-        let meant = |drive: &Guarded| !frame.id().is_extended() && drive.may_hear(number);
+        let meant = |drive: &GuardedDrive| !frame.id().is_extended() && drive.may_hear(number);
         if !self.drives.iter().any(meant) {
             return match self.limits.other_identifiers {
                 true => Ok(()),
@@ -187,7 +187,7 @@ impl Gate {
 
     /// Forgets every lock and every speed: the drives were restarted, or frames were lost.
     pub fn doubt(&mut self) {
-        self.drives.iter_mut().for_each(Guarded::doubt);
+        self.drives.iter_mut().for_each(GuardedDrive::doubt);
     }
 
     /// Takes notice of C8, the rpm of 100 % speed, and of 34, the limit of the speed, as they were read from the drive that receives
@@ -250,15 +250,15 @@ impl Gate {
 
     /// Takes notice that this drive answers on the identifiers of the rig's file, and on no other that was given to it.
     pub fn settled(&mut self, first_rx: u16) {
-        self.with(first_rx, Guarded::settled);
+        self.with(first_rx, GuardedDrive::settled);
     }
 
     /// Takes notice that this drive sends nothing by itself.
     pub fn sends_nothing(&mut self, first_rx: u16) {
-        self.with(first_rx, Guarded::sends_nothing);
+        self.with(first_rx, GuardedDrive::sends_nothing);
     }
 
-    fn with(&mut self, first_rx: u16, act: impl FnOnce(&mut Guarded)) {
+    fn with(&mut self, first_rx: u16, act: impl FnOnce(&mut GuardedDrive)) {
         let mut all = self.drives.iter_mut();
         if let Some(drive) = all.find(|drive| drive.first_rx == first_rx) {
             act(drive);
@@ -290,7 +290,7 @@ impl Gate {
     }
 
     /// The share of the bit rate that the replies of all cycles take, in thousandths, with `request` added.
-    fn load_with(&self, request: Request, meant: &dyn Fn(&Guarded) -> bool) -> u64 {
+    fn load_with(&self, request: Request, meant: &dyn Fn(&GuardedDrive) -> bool) -> u64 {
         // Frames in 1000 s, so that a division loses nothing that counts.
         let frames = |every: u8| 1_000_000 / u64::from(every.max(1));
         let mut total = 0;
@@ -311,7 +311,7 @@ impl Gate {
         total * REPLY_BITS / u64::from(self.rate.bits_per_second())
     }
 
-    fn permits(&self, now: Instant, drive: &Guarded, request: Request) -> Result<(), Denial> {
+    fn permits(&self, now: Instant, drive: &GuardedDrive, request: Request) -> Result<(), Denial> {
         let Request::Write { register, data } = request else {
             return Ok(());
         };

@@ -33,7 +33,7 @@ use super::words::{MODE_EVENT, MODE_LOCK};
 use crate::can::Frame;
 use crate::time::{Instant, Span};
 use alloc::collections::VecDeque;
-use slots::{Heard, Slots};
+use slots::{FrameTiming, Slots};
 
 /// Most jobs that wait.
 const MOST_JOBS: usize = 256;
@@ -46,9 +46,9 @@ const POLL: Span = Span::from_millis(10);
 #[derive(Clone, Debug)]
 pub struct Master {
     options: Options,
-    /// The identifier to which it sends; behind a write to 68 the old one as well.
+    /// The identifier to which it sends; after a write to 68 the old one as well.
     rx: (u16, Option<u16>),
-    /// The identifier from which it takes replies; behind a write to 69 the old one as well.
+    /// The identifier from which it takes replies; after a write to 69 the old one as well.
     tx: (u16, Option<u16>),
     /// The lower half of MODE as it was last written, for a lock that keeps sending by event.
     mode: u16,
@@ -363,16 +363,16 @@ impl Master {
         let status = reply.register == 0x40 && self.mode & MODE_EVENT != 0;
         let tolerance = self.options.cycle_tolerance;
         match self.slots.heard(now, reply.register, tolerance) {
-            Heard::Due => self.report(Event::Cyclic { reply }),
+            FrameTiming::Due => self.report(Event::Cyclic { reply }),
             _ if answers => {}
-            Heard::Stopped => {}
+            FrameTiming::Stopped => {}
             _ if self.is_owed(now, reply.register) => {}
             _ if status => self.report(Event::Status { reply }),
-            Heard::Early(after) => {
+            FrameTiming::Early(after) => {
                 let register = reply.register;
                 self.report(Event::Disturbance(Disturbance::Early { register, after }));
             }
-            Heard::Other => self.report(Event::Disturbance(Disturbance::Unasked { reply })),
+            FrameTiming::Other => self.report(Event::Disturbance(Disturbance::Unasked { reply })),
         }
     }
 

@@ -40,7 +40,7 @@ impl Slot {
 
 /// What a frame is to the cycles.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Heard {
+pub(super) enum FrameTiming {
     /// A frame of a cycle, in its time or late.
     Due,
     /// Too early for its cycle: the time since the frame before it.
@@ -94,28 +94,28 @@ impl Slots {
     }
 
     /// A frame with this register has come.
-    pub(super) fn heard(&mut self, now: Instant, register: u8, tolerance: Span) -> Heard {
+    pub(super) fn heard(&mut self, now: Instant, register: u8, tolerance: Span) -> FrameTiming {
         let mut slots = self.slots.iter_mut().flatten();
         let Some(slot) = slots.find(|slot| slot.register == register) else {
-            return Heard::Other;
+            return FrameTiming::Other;
         };
         match slot.stopped {
-            Some(until) if now <= until => return Heard::Stopped,
-            Some(_) => return Heard::Other,
+            Some(until) if now <= until => return FrameTiming::Stopped,
+            Some(_) => return FrameTiming::Other,
             None => {}
         }
         let after = now.since(slot.last);
         if after == Span::ZERO {
             // The frame that has started the cycle.
-            return Heard::Stopped;
+            return FrameTiming::Stopped;
         }
         if after + tolerance < slot.interval() {
-            return Heard::Early(after);
+            return FrameTiming::Early(after);
         }
         slot.last = now;
         slot.frames += 1;
         slot.next = now + slot.interval();
-        Heard::Due
+        FrameTiming::Due
     }
 
     pub(super) fn next_missing(&self, tolerance: Span) -> Option<Instant> {

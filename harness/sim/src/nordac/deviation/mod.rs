@@ -35,11 +35,11 @@ enum How {
     /// It reads these octets as a telegram where a right drive reads none.
     Reads(fn(&Raw) -> Option<Vec<u8>>),
     /// It answers this request in place of the one on the line.
-    Hears(fn(&Seen<'_>, &mut Parts)),
+    Hears(fn(&Context<'_>, &mut Parts)),
     /// It sends this in place of its reply.
-    Sends(fn(&Seen<'_>, &mut Reply)),
+    Sends(fn(&Context<'_>, &mut Reply)),
     /// Both.
-    Both(fn(&Seen<'_>, &mut Parts), fn(&Seen<'_>, &mut Reply)),
+    Both(fn(&Context<'_>, &mut Parts), fn(&Context<'_>, &mut Reply)),
 }
 
 /// The deviations of a drive: those of what it reads, of what it hears, and of what it sends.
@@ -60,14 +60,14 @@ struct Memory {
 }
 
 /// What a deviation knows.
-struct Seen<'a> {
+struct Context<'a> {
     drive: &'a Drive,
     memory: &'a Memory,
     /// The request as it is on the line.
     request: &'a Parts,
 }
 
-impl Seen<'_> {
+impl Context<'_> {
     fn ppo(&self) -> PpoType {
         self.drive.slave().ppo()
     }
@@ -194,8 +194,8 @@ impl Deviant {
         }
     }
 
-    fn seen<'a>(&'a self, request: &'a Parts) -> Seen<'a> {
-        Seen {
+    fn seen<'a>(&'a self, request: &'a Parts) -> Context<'a> {
+        Context {
             drive: &self.drive,
             memory: &self.memory,
             request,
@@ -203,7 +203,7 @@ impl Deviant {
     }
 }
 
-/// How many bits behind the request a reply begins.
+/// How many bits after the request a reply begins.
 fn own_delay(ready: Option<Instant>, at: Instant, bit: u64) -> Option<u64> {
     ready.and_then(|ready| ready.since(at).units().checked_div(bit))
 }

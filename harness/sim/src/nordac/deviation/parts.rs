@@ -103,7 +103,7 @@ impl Parts {
 pub(super) struct Reply {
     /// Its octets; none for no reply.
     pub(super) octets: Vec<u8>,
-    /// How many bits it begins behind the request.
+    /// How many bits it begins after the request.
     pub(super) delay: u64,
     /// How many times it is sent.
     pub(super) times: u64,

@@ -120,7 +120,7 @@ fn time_of(octets: &[Octet]) -> Span {
     })
 }
 
-/// What the slave has sent is nothing or one reply of its own, behind min T_SDR.
+/// What the slave has sent is nothing or one reply of its own, after min T_SDR.
 fn judge(line: &mut OctetSegment<Member<Box<Drive>>>, notes: &mut Notebook<'_>) {
     let sent = line.take_record(1);
     let asked = line.take_record(0);

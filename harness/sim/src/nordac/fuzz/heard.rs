@@ -6,7 +6,7 @@ use harness_proto::nordac::{Answer, PpoType, Task};
 use harness_proto::profibus::dp::DpState;
 
 /// A telegram, and what came of it.
-pub(super) struct Heard<'a> {
+pub(super) struct TelegramEffect<'a> {
     pub(super) octets: &'a [u8],
     /// It is the last one again.
     pub(super) repeated: bool,
@@ -21,7 +21,7 @@ pub(super) struct Heard<'a> {
     pub(super) executed: Option<Answer>,
 }
 
-impl Heard<'_> {
+impl TelegramEffect<'_> {
     /// What the telegram was to the drive.
     pub(super) fn events(&self, reply: Option<&[u8]>) -> impl Iterator<Item = Event> {
         let (event, task) = self.event(reply);

@@ -1,7 +1,7 @@
 //! Telegrams, waits and faults for one drive, beside the reference model of its module.
 
 use super::cells::{Cell, Event, State};
-use super::heard::Heard;
+use super::heard::TelegramEffect;
 use super::telegrams::{ADDRESS, any_telegram, octets, parameters, telegram};
 use crate::fuzz::{LONGEST, Notebook};
 use crate::nordac::reference::ReferenceSlave;
@@ -37,12 +37,12 @@ const WORDS: [u16; 16] = [
     0x447F, 0x147F, 0x007F, 0x0000,
 ];
 
-/// Milliseconds that pass behind an operation.
+/// Milliseconds that pass after an operation.
 const WAITS: [u64; 16] = [
     0, 0, 0, 0, 0, 0, 1, 1, 5, 20, 100, 100, 500, 2_000, 10_000, 60_000,
 ];
 
-/// One operation: what, how it is sent, its data, and the time behind it.
+/// One operation: what, how it is sent, its data, and the time after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Operation {
     what: u8,
@@ -313,7 +313,7 @@ impl Pair {
             self.drive.sent(self.now);
             self.pass(self.now, reached);
         }
-        let heard = Heard {
+        let heard = TelegramEffect {
             octets,
             repeated: damaged.is_none() && self.reference.repeated(),
             master,

@@ -126,7 +126,7 @@ impl Inverter {
         }
     }
 
-    /// The checks behind the index; gives the value that a change task is to store.
+    /// The checks after the index; gives the value that a change task is to store.
     fn check(&self, task: Pkw, place: TaskTarget, ppo: PpoType) -> Result<Option<i64>, PkwError> {
         let TaskTarget { parameter, .. } = place;
         let (kind, long) = (task.task(), parameter.has(Flag::Long));

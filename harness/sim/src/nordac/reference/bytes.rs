@@ -20,7 +20,7 @@ impl Bytes {
         Self { octets, len }
     }
 
-    /// These octets, one part behind the other.
+    /// These octets, one part after the other.
     pub(super) fn of(parts: &[&[u8]]) -> Self {
         let mut all = Self::zeros(0);
         for part in parts {

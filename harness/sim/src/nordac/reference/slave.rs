@@ -127,7 +127,7 @@ impl ReferenceSlave {
         self.state
     }
 
-    /// How many bits behind a request its reply begins.
+    /// How many bits after a request its reply begins.
     #[must_use]
     pub const fn delay(&self) -> u64 {
         self.delay

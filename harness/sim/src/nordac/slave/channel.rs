@@ -7,7 +7,7 @@ use harness_proto::time::Instant;
 
 /// A task that was executed, and what the inverter answered then.
 #[derive(Clone, Copy, Debug, Hash)]
-struct Executed {
+struct ExecutedTask {
     task: Pkw,
     answer: Answer,
 }
@@ -18,9 +18,9 @@ pub(super) struct Channel {
     /// What the last exchange has brought.
     last: Pkw,
     /// The task whose answer is shown.
-    shown: Option<Executed>,
+    shown: Option<ExecutedTask>,
     /// The task whose answer is not there yet, and in how many exchanges it will be.
-    due: Option<(Executed, u8)>,
+    due: Option<(ExecutedTask, u8)>,
 }
 
 impl Channel {
@@ -37,7 +37,7 @@ impl Channel {
 
     /// The answer that is shown, with the current value of what was asked for.
     pub(super) fn answer(&self, at: Instant, inverter: &Inverter, ppo: PpoType) -> Pkw {
-        let Some(Executed { task, answer }) = self.shown else {
+        let Some(ExecutedTask { task, answer }) = self.shown else {
             return Pkw::default();
         };
         let is_fixed = matches!(
@@ -68,7 +68,7 @@ impl Channel {
         };
         if is_new {
             let answer = inverter.task(at, task, ppo);
-            self.due = Some((Executed { task, answer }, properties.pkw_latency));
+            self.due = Some((ExecutedTask { task, answer }, properties.pkw_latency));
         }
     }
 }

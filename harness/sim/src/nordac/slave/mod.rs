@@ -46,7 +46,7 @@ struct Watchdog {
 
 /// What Set_Prm has agreed with the own master; forgotten in Wait_Prm.
 #[derive(Clone, Debug, Default)]
-struct Agreed {
+struct Agreement {
     master: Option<u8>,
     watchdog: Option<Watchdog>,
     group: u8,
@@ -63,7 +63,7 @@ pub struct Slave {
     /// The PPO type that is exchanged.
     ppo: PpoType,
     state: DpState,
-    agreed: Agreed,
+    agreed: Agreement,
     fcb: Fcb,
     /// The reply to the last request that counts; `None` if there was none.
     last_reply: Option<Buffer>,
@@ -87,7 +87,7 @@ impl Slave {
     pub fn new(properties: Properties, settings: Settings) -> Self {
         Self {
             state: DpState::WaitPrm,
-            agreed: Agreed::default(),
+            agreed: Agreement::default(),
             fcb: Fcb::default(),
             last_reply: None,
             min_tsdr: default_tsdr(),
@@ -324,7 +324,7 @@ impl Slave {
     /// Enters Wait_Prm.
     fn wait_for_parameters(&mut self) {
         self.state = DpState::WaitPrm;
-        self.agreed = Agreed::default();
+        self.agreed = Agreement::default();
         self.data = ProcessData::default();
     }
 

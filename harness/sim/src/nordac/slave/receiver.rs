@@ -6,7 +6,7 @@ use harness_proto::profibus::rate::SYN_BITS;
 use harness_proto::profibus::{Buffer, BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 
-/// Collects the octets of a telegram. A telegram begins behind [`SYN_BITS`] idle bits and has no gap; after a damaged one the receiver waits
+/// Collects the octets of a telegram. A telegram begins after [`SYN_BITS`] idle bits and has no gap; after a damaged one the receiver waits
 /// for the line to be idle that long again.
 #[derive(Clone, Debug)]
 pub(in crate::nordac) struct Receiver {

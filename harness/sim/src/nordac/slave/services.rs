@@ -1,6 +1,6 @@
 //! The services that set a slave up: Set_Prm, Chk_Cfg, Slave_Diag (EN 2).
 
-use super::{Agreed, Outcome, Refusal, Slave, Watchdog, default_tsdr};
+use super::{Agreement, Outcome, Refusal, Slave, Watchdog, default_tsdr};
 use harness_proto::nordac::properties::{
     CfgFollowsPpoType, ChkCfgEarly, ExtDiag, ForeignPrm, UserPrm,
 };
@@ -62,7 +62,7 @@ impl Slave {
 
     fn agree(&mut self, at: Instant, sa: u8, prm: &SetPrm<'_>) {
         self.state = DpState::WaitCfg;
-        self.agreed = Agreed {
+        self.agreed = Agreement {
             master: Some(sa),
             watchdog: prm.watchdog_tens_of_ms().map(|tens| {
                 let time = Span::from_millis(10) * u64::from(tens);

@@ -1,6 +1,6 @@
 //! Deviations of the drive behind its bus (ND21 13, 14).
 
-use super::how::{Deviation, Held, How, behind_the_bus, wrong};
+use super::how::{Deviation, FalseCell, How, behind_the_bus, wrong};
 use harness_proto::nd21::bits::{flags, flags2, hw_version2, ps_status, status};
 use harness_proto::nd21::units::{RAMP_OFF, SLIPPING_OFF};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
@@ -18,16 +18,16 @@ const NIST_LOW: u16 = ram::NIST + 1;
 const MSOLL_HIGH: u16 = ram::MSOLL;
 const MSOLL_LOW: u16 = ram::MSOLL + 1;
 
-const fn word(address: u16, value: fn(u16) -> u16) -> Held {
-    Held {
+const fn word(address: u16, value: fn(u16) -> u16) -> FalseCell {
+    FalseCell {
         address,
         word: true,
         value,
     }
 }
 
-const fn byte(address: u16, value: fn(u16) -> u16) -> Held {
-    Held {
+const fn byte(address: u16, value: fn(u16) -> u16) -> FalseCell {
+    FalseCell {
         address,
         word: false,
         value,

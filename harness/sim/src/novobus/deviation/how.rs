@@ -208,7 +208,7 @@ pub(super) struct Write {
 pub(super) type Peek<'a> = &'a mut dyn FnMut(u16) -> u8;
 
 /// A cell in which the drive's program finds another value than the real one.
-pub(super) struct Held {
+pub(super) struct FalseCell {
     pub(super) address: u16,
     /// One byte or two.
     pub(super) word: bool,
@@ -265,5 +265,5 @@ pub(super) enum How {
     /// Its time-out monitoring is always so.
     Monitors(bool),
     /// Its program finds other values in cells.
-    Holds(&'static [Held]),
+    Holds(&'static [FalseCell]),
 }

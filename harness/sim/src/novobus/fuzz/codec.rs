@@ -11,7 +11,7 @@ use harness_proto::novobus::sync::{Addressing, PAUSE, SyncByte, SyncError};
 use harness_proto::novobus::telegram::{Telegram, TelegramError};
 use std::collections::BTreeSet;
 
-/// A stream of commands, and the same bytes as a stream of telegrams: each begins behind the one before, or behind the byte that settled
+/// A stream of commands, and the same bytes as a stream of telegrams: each begins after the one before, or behind the byte that settled
 /// that there is none.
 ///
 /// # Panics

@@ -18,7 +18,7 @@ const BITS: [(u16, &str, &str); 5] = [
 
 /// A drive at one moment.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Seen {
+struct Snapshot {
     mode: Mode,
     error: u16,
     bits: [u8; BITS.len()],
@@ -30,7 +30,7 @@ struct Seen {
     gpo2: bool,
 }
 
-impl Seen {
+impl Snapshot {
     fn of(drive: &Nd21Drive) -> Self {
         let cells = drive.program().cells();
         let shown = drive.shown();
@@ -53,13 +53,13 @@ impl Seen {
 
 /// An onlooker at a drive.
 pub(super) struct Watch {
-    last: Seen,
+    last: Snapshot,
 }
 
 impl Watch {
     pub(super) fn new(drive: &Nd21Drive) -> Self {
         Self {
-            last: Seen::of(drive),
+            last: Snapshot::of(drive),
         }
     }
 
@@ -70,28 +70,28 @@ impl Watch {
 
     /// What was changed from outside is no doing of the drive.
     pub(super) fn forget(&mut self, drive: &Nd21Drive) {
-        self.last = Seen::of(drive);
+        self.last = Snapshot::of(drive);
     }
 
     /// Notes what the drive has done since it was looked at last.
     pub(super) fn look(&mut self, notes: &mut Notebook<'_>, drive: &Nd21Drive) {
-        let now = Seen::of(drive);
+        let now = Snapshot::of(drive);
         if now == self.last {
             return;
         }
         let before = std::mem::replace(&mut self.last, now);
         outside(notes, &before, &now);
-        for (place, (cell, name, section)) in BITS.into_iter().enumerate() {
+        for (place, cell) in BITS.into_iter().enumerate() {
             let (was, is) = (before.bits[place], now.bits[place]);
-            bits(notes, (cell, name, section), (was, is), "set");
-            bits(notes, (cell, name, section), (is, was), "cleared");
+            bits(notes, cell, was, is, "set");
+            bits(notes, cell, is, was, "cleared");
         }
         steps(notes, &before, &now);
     }
 }
 
 /// What can be seen without the bus.
-fn outside(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
+fn outside(notes: &mut Notebook<'_>, before: &Snapshot, now: &Snapshot) {
     if before.mode != now.mode {
         let (was, is) = (mode(before.mode), mode(now.mode));
         notes.note(|| Feature::new("11.8", format!("mode {was}"), format!("then {is}")));
@@ -134,7 +134,8 @@ fn outside(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
 fn bits(
     notes: &mut Notebook<'_>,
     (cell, name, section): (u16, &'static str, &'static str),
-    (from, to): (u8, u8),
+    from: u8,
+    to: u8,
     means: &'static str,
 ) {
     let new = set_in(cell, to).filter(|bit| set_in(cell, from).all(|other| other != *bit));
@@ -144,7 +145,7 @@ fn bits(
 }
 
 /// The steps of what takes its time: referencing, positioning, the EEPROM controller.
-fn steps(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
+fn steps(notes: &mut Notebook<'_>, before: &Snapshot, now: &Snapshot) {
     let (was, is) = (
         before.bits[2] & flags2::REFERENCING,
         now.bits[2] & flags2::REFERENCING,

@@ -1,7 +1,7 @@
 //! An attack on the guard: no input makes it let a command pass that the limits deny, as judged by drives of the reference
 //! model, which shares no code with it.
 
-use super::guard_words::{self as words, Heard};
+use super::guard_words::{self as words, RingByte};
 use crate::fuzz::LONGEST;
 use crate::fuzz::Notebook;
 use crate::novobus::reference::{Cell, Drive};
@@ -69,7 +69,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
             silence(&mut ring, usize::from(whose & 7), whose, now);
         }
         let bad = index + 1 == usize::from(damaged);
-        let heard = Heard {
+        let heard = RingByte {
             stage: guard.stage(),
             byte,
             bad,

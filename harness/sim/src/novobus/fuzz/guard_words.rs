@@ -8,7 +8,7 @@ use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
 
 /// A byte, where the drives stood before it, and whether it leaves damaged.
-pub(super) struct Heard {
+pub(super) struct RingByte {
     pub(super) stage: Stage,
     pub(super) byte: u8,
     pub(super) bad: bool,
@@ -17,7 +17,7 @@ pub(super) struct Heard {
 /// What the guard made of a byte: where the drives stand behind it, or why it did not pass.
 pub(super) fn note(
     notes: &mut Notebook<'_>,
-    heard: &Heard,
+    heard: &RingByte,
     admitted: Result<(), Denial>,
     guard: &Guard,
 ) {
@@ -45,7 +45,7 @@ pub(super) fn note(
 }
 
 /// A byte passed while a drive is in the error mode (ND21 9.7).
-pub(super) fn note_error_mode(notes: &mut Notebook<'_>, heard: &Heard) {
+pub(super) fn note_error_mode(notes: &mut Notebook<'_>, heard: &RingByte) {
     notes.note(|| {
         let (_, place) = stage(heard.stage);
         Feature::new("9.7", "a drive is in the error mode", place)
@@ -81,7 +81,7 @@ const fn stage(stage: Stage) -> (&'static str, &'static str) {
     }
 }
 
-fn event(heard: &Heard) -> &'static str {
+fn event(heard: &RingByte) -> &'static str {
     let byte = heard.byte;
     if heard.bad {
         return "a line error";

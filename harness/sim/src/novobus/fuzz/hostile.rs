@@ -11,7 +11,7 @@ use harness_proto::novobus::master::{CyclePace, Event, Job, JobId, Master, Maste
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::time::Instant;
 
-/// Silence behind the input, in byte times, in which everything comes to its end.
+/// Silence after the input, in byte times, in which everything comes to its end.
 const SILENCE: usize = 250_000;
 
 /// The first byte is the size of the ring; of the others each is one byte time: FE and FF are silence, FD a

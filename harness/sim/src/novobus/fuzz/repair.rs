@@ -37,12 +37,12 @@ struct Reader {
     /// The last address byte, counted on by "next drive".
     address: u8,
     /// Commands half received: there are few, so they are looked for one after another, in a place that costs no memory.
-    begun: [Option<Begun>; MOST_BEGUN],
+    begun: [Option<PartialCommand>; MOST_BEGUN],
     lost: bool,
 }
 
 /// A command as far as received, and by which drive.
-struct Begun {
+struct PartialCommand {
     address: u8,
     layout: &'static Layout,
     received: usize,
@@ -95,13 +95,13 @@ impl Reader {
 
     fn parameter(&mut self, byte: &mut u8) {
         let address = self.address;
-        let of_address =
-            |place: &&mut Option<Begun>| place.as_ref().is_some_and(|one| one.address == address);
-        let Some(place) = self.begun.iter_mut().find(of_address) else {
+        let of_address = |one: &PartialCommand| one.address == address;
+        let mut begun = self.begun.iter_mut();
+        let Some(place) = begun.find(|place| place.as_ref().is_some_and(of_address)) else {
             let free = self.begun.iter_mut().find(|place| place.is_none());
             match (layout(*byte, ReadLongAnswer::default()), free) {
                 (Some(layout), Some(free)) => {
-                    *free = Some(Begun {
+                    *free = Some(PartialCommand {
                         address,
                         layout,
                         received: 1,

@@ -103,7 +103,7 @@ fn meant(command: &[u8], before: &Image) -> (&'static str, Vec<u16>) {
     }
 }
 
-/// What a cell holds behind a write of `data` to it: read-only cells and bits stay as they are (14.2.1).
+/// What a cell holds after a write of `data` to it: read-only cells and bits stay as they are (14.2.1).
 fn written(address: u16, before: u8, data: u8) -> u8 {
     match cell_at(address).filter(|cell| cell.access != Access::Read) {
         Some(cell) => before & cell.read_only_bits | data & !cell.read_only_bits,
@@ -191,7 +191,7 @@ fn differing(must: &Image, is: &Image, loose: &[u16]) -> Option<usize> {
     otherwise.next().map(|(place, _)| place)
 }
 
-/// The port of the outputs behind WriteIO: with the analogue output active GPO1 is no digital one (14.3.4).
+/// The port of the outputs after WriteIO: with the analogue output active GPO1 is no digital one (14.3.4).
 fn output(command: &[u8], data: u8, before: &Image) -> u8 {
     let analogue = at(before, ram::HW_VERSION2) & hw_version2::NO_ANALOGUE_OUTPUT == 0;
     match command {

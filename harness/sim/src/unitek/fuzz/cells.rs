@@ -9,7 +9,7 @@ use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 
 /// How many cycles run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Running {
+pub(super) enum CycleCount {
     /// None.
     None,
     /// 1 to 7.
@@ -29,7 +29,7 @@ pub(super) struct State {
     pub(super) closed: bool,
     /// E2.
     pub(super) ready: bool,
-    pub(super) cycles: Running,
+    pub(super) cycles: CycleCount,
 }
 
 /// How many states there are.
@@ -41,9 +41,9 @@ impl State {
     pub(super) fn of(drive: &Drive) -> Self {
         let mode = drive.held()[0x51];
         let cycles = match drive.running_cycles().count() {
-            0 => Running::None,
-            CYCLES => Running::Full,
-            _ => Running::Some,
+            0 => CycleCount::None,
+            CYCLES => CycleCount::Full,
+            _ => CycleCount::Some,
         };
         Self {
             locked: mode & u32::from(MODE_LOCK) != 0,
@@ -57,9 +57,9 @@ impl State {
     /// The state with this number, below 48.
     const fn numbered(number: usize) -> Self {
         let cycles = match number / 16 {
-            0 => Running::None,
-            1 => Running::Some,
-            _ => Running::Full,
+            0 => CycleCount::None,
+            1 => CycleCount::Some,
+            _ => CycleCount::Full,
         };
         Self {
             locked: number & 1 != 0,
@@ -86,9 +86,9 @@ impl State {
         let enable = if self.closed { "closed" } else { "open" };
         let ready = if self.ready { "ready" } else { "not ready" };
         let cycles = match self.cycles {
-            Running::None => "no cycle",
-            Running::Some => "1 to 7 cycles",
-            Running::Full => "8 cycles",
+            CycleCount::None => "no cycle",
+            CycleCount::Some => "1 to 7 cycles",
+            CycleCount::Full => "8 cycles",
         };
         format!("{lock}, events {events}, enable {enable}, {ready}, {cycles}")
     }
@@ -166,10 +166,10 @@ impl Cell {
         } = self.state;
         match self.event {
             // A ninth request is one of a full table, and any other needs a free place.
-            Event::Start => cycles != Running::Full,
-            Event::Ninth => cycles == Running::Full,
+            Event::Start => cycles != CycleCount::Full,
+            Event::Ninth => cycles == CycleCount::Full,
             Event::ReadOfCycle | Event::Restart | Event::Stop | Event::Cyclic => {
-                cycles != Running::None
+                cycles != CycleCount::None
             }
             Event::StatusSent => by_event,
             // Only an enabled drive homes, and it stops when it is no longer enabled.

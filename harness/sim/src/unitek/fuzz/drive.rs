@@ -21,7 +21,7 @@ const MOST_TIME: u64 = 250;
 /// Homing ends soon in all variants but that of `homing-time`.
 const HOMING: Span = Span::from_millis(5);
 
-/// What happens to the drive, and how many milliseconds pass behind it.
+/// What happens to the drive, and how many milliseconds pass after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Operation {
     what: What,

@@ -14,13 +14,13 @@ use harness_proto::unitek::words::MODE_LOCK;
 use harness_proto::unitek::{Data, Reply, Request};
 use std::collections::VecDeque;
 
-/// Most steps without a wait, and behind the input until every job has ended.
+/// Most steps without a wait, and after the input until every job has ended.
 const MOST_STEPS: usize = 100_000;
 
 /// Most frames that a start-up sends: two bits polled every 10 ms for 300 ms, each poll repeated, and four writes read back.
 const MOST_FRAMES: usize = 500;
 
-/// What happens, and how much time passes behind it.
+/// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     what: What,

@@ -14,7 +14,7 @@ use harness_proto::unitek::properties::Properties;
 /// Behind so much time a case ends, so that none takes long.
 const MOST_TIME: Span = Span::from_millis(150);
 
-/// Time behind the last operation, in which everything that waits is sent.
+/// Time after the last operation, in which everything that waits is sent.
 const REST: Span = Span::from_millis(30);
 
 /// Bits of the intermission, which begins where the last bit of a frame has passed.
@@ -25,7 +25,7 @@ const RATES: [BitRate; 4] = [BitRate::K500, BitRate::K100, BitRate::K250, BitRat
 const DRIVES: usize = 3;
 const HOSTS: usize = 2;
 
-/// What happens, and how much time passes behind it.
+/// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     what: What,

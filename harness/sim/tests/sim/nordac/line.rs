@@ -66,7 +66,7 @@ fn faults_in_a_request() {
     let late = LineFault::Octet(LinkFault::Delay(Span::from_micros(20)));
     assert_eq!(faulty(0, 1, late).0, REPLY);
     assert_eq!(faulty(0, 2, late).0, "");
-    // With an octet right behind it a telegram is longer than it announces.
+    // With an octet right after it a telegram is longer than it announces.
     assert_eq!(faulty(0, 6, LineFault::Octet(LinkFault::Duplicate)).0, "");
     let (heard, _) = faulty(0, 3, LineFault::Octet(flip(3)));
     assert_eq!(

@@ -370,7 +370,7 @@ fn the_watchdog_is_exact() {
     assert_eq!(desk.drive().slave().state().name(), "Wait_Prm");
 }
 
-/// The reply begins min T_SDR behind the request, at every rate.
+/// The reply begins min T_SDR after the request, at every rate.
 #[test]
 fn reply_delay() {
     for rate in BusRate::ALL {

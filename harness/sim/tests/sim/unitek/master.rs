@@ -232,7 +232,7 @@ fn cycles_are_supervised() {
         bench.disturbances(),
         [Disturbance::Missing { register: 0x30 }]
     );
-    // A frame 3 ms behind the last one: sent twice, or by another drive.
+    // A frame 3 ms after the last one: sent twice, or by another drive.
     let last = bench.master.slots().next().unwrap().last;
     let doubled: Frame = "181#30000000".parse().unwrap();
     let early = Span::from_millis(3);

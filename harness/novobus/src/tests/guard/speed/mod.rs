@@ -338,7 +338,7 @@ fn a_read_that_is_under_way_changes_what_is_written() {
             byte(ram::EEPROM_CONTROL, 0x82),
         ]
     };
-    // 10 ms each, as behind every telegram.
+    // 10 ms each, as after every telegram.
     let wait = || vec![Vec::new(); 5];
     let attack = |polls: Vec<Vec<u8>>, limits| {
         let mut line = bench(&left, limits);
@@ -416,7 +416,7 @@ fn process_data_go_where_they_may() {
     assert_eq!(denied(AN_OUT, outputs, &[data()]), None);
     assert_eq!(denied(0x57, outputs, &[data()]), Some(0), "Flags2");
     assert_eq!(denied(0x08, motion, &[data()]), None);
-    // What was read of it does not hold behind a reset.
+    // What was read of it does not hold after a reset.
     let resets = Limits {
         reset: true,
         ..motion

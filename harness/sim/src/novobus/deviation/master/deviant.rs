@@ -1,7 +1,7 @@
 //! A master that deviates.
 
-use super::how::{Heard, How, MasterDeviation, Notes, Sending};
-use super::speech::{Speech, Spoken, What};
+use super::how::{How, MasterDeviation, Notes, ReturnedByte, Sending};
+use super::speech::{SentByte, Speech, What};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
@@ -32,7 +32,7 @@ pub struct DeviantMaster {
     byte_time: Span,
     speech: Speech,
     /// What the master inside waits for, oldest first, and whether it went out.
-    flown: VecDeque<(Spoken, bool)>,
+    flown: VecDeque<(SentByte, bool)>,
     /// The sums of the answers begun.
     answers: BTreeMap<u8, Checksum>,
     notes: Notes,
@@ -182,7 +182,7 @@ impl DeviantMaster {
     }
 
     /// What must come back for a byte; `None` for data (9.3, 9.6, 10).
-    fn expected(&self, spoken: &Spoken) -> Option<u8> {
+    fn expected(&self, spoken: &SentByte) -> Option<u8> {
         match spoken.what {
             What::Address => Some(spoken.byte.wrapping_add(self.notes.ring.drives())),
             What::ProcessData | What::Field(_, Reply::Data(_)) => None,
@@ -200,7 +200,7 @@ impl DeviantMaster {
         if is_compared(self.inner.phase())
             && let Some((spoken, _)) = self.flown.pop_front()
         {
-            let heard = Heard {
+            let heard = ReturnedByte {
                 received,
                 spoken,
                 expected: self.expected(&spoken),

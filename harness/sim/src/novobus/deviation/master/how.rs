@@ -1,6 +1,6 @@
 //! What a deviation of the master is, and the ways to inject one.
 
-use super::speech::Spoken;
+use super::speech::SentByte;
 use super::table::DEVIATIONS;
 use crate::deviation::{Deviation, DeviationTable};
 use harness_proto::line::Received;
@@ -31,15 +31,15 @@ pub(super) enum Sending {
 
 /// A byte that has come back, beside the one that it is the answer to.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Heard {
+pub(super) struct ReturnedByte {
     pub(super) received: Received,
     /// What the master inside has sent for it.
-    pub(super) spoken: Spoken,
+    pub(super) spoken: SentByte,
     /// What must come; `None` for data.
     pub(super) expected: Option<u8>,
 }
 
-impl Heard {
+impl ReturnedByte {
     /// What must come, where that is known and no line error is in it.
     pub(super) fn believed(&self) -> Received {
         match self.expected {
@@ -73,11 +73,11 @@ pub(super) enum How {
     /// It works by other options.
     Options(fn(MasterOptions) -> MasterOptions),
     /// It sends other bytes.
-    Sends(fn(&Spoken) -> Sending),
+    Sends(fn(&SentByte) -> Sending),
     /// It takes bytes for others.
-    Hears(fn(&Heard) -> Received),
+    Hears(fn(&ReturnedByte) -> Received),
     /// Both, so that it does not notice.
-    Mistakes(fn(&Spoken) -> Sending, fn(&Heard) -> Received),
+    Mistakes(fn(&SentByte) -> Sending, fn(&ReturnedByte) -> Received),
     /// It does another job than the one that it is given.
     Submits(fn(RingSize, Job) -> Job),
     /// It does what it is given twice, where this says so.

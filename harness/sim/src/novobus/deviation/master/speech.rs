@@ -20,7 +20,7 @@ pub(super) enum What {
     ProcessData,
     /// A command byte (9.5).
     Code,
-    /// A byte behind the command byte: what it is, and what comes in its place.
+    /// A byte after the command byte: what it is, and what comes in its place.
     Field(Field, Reply),
     /// This byte of the 22 of the check sequence (9.8), counted from 0.
     Sequence(u8),
@@ -30,7 +30,7 @@ pub(super) enum What {
 
 /// A byte as the master inside sends it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spoken {
+pub(super) struct SentByte {
     pub(super) byte: u8,
     /// What it is for.
     pub(super) what: What,
@@ -48,7 +48,7 @@ pub(super) struct Spoken {
 
 /// A command begun.
 #[derive(Clone, Copy, Debug)]
-struct Begun {
+struct PartialCommand {
     layout: &'static Layout,
     taken: usize,
     sum: Checksum,
@@ -64,7 +64,7 @@ pub(super) struct Speech {
     address_next: bool,
     drive: Option<u8>,
     drive_before: Option<u8>,
-    begun: BTreeMap<u8, Begun>,
+    begun: BTreeMap<u8, PartialCommand>,
     sequence: u8,
     after_sequence: bool,
 }
@@ -96,7 +96,7 @@ impl Speech {
     }
 
     /// The next byte, sent in this phase.
-    pub(super) fn read(&mut self, byte: u8, phase: Phase) -> Spoken {
+    pub(super) fn read(&mut self, byte: u8, phase: Phase) -> SentByte {
         let sum = Checksum::EMPTY;
         if phase == Phase::Resetting {
             let what = What::Sequence(self.sequence);
@@ -130,7 +130,7 @@ impl Speech {
         spoken
     }
 
-    fn sync(&mut self, byte: u8, phase: Phase) -> Spoken {
+    fn sync(&mut self, byte: u8, phase: Phase) -> SentByte {
         let what = match SyncByte::decode(byte) {
             Ok(SyncByte::Telegram(header)) => {
                 self.net = header.net_length();
@@ -158,7 +158,7 @@ impl Speech {
         };
         let Some(begun) = self.begun.get_mut(&drive) else {
             if let Some(layout) = layout(byte, self.read_long) {
-                let begun = Begun {
+                let begun = PartialCommand {
                     layout,
                     taken: 0,
                     sum: Checksum::EMPTY.with(byte),
@@ -179,8 +179,8 @@ impl Speech {
         (what, sum)
     }
 
-    fn spoken(&mut self, byte: u8, what: What, sum: Checksum, phase: Phase) -> Spoken {
-        Spoken {
+    fn spoken(&mut self, byte: u8, what: What, sum: Checksum, phase: Phase) -> SentByte {
+        SentByte {
             byte,
             what,
             drive: self.drive,

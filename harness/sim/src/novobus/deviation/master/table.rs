@@ -1,7 +1,7 @@
 //! The table of wrong masters (ND21 8, 9, 10, 11).
 
 use super::how::{Due, How, MasterDeviation, MasterInjection, Notes, Sending};
-use super::speech::{Spoken, What};
+use super::speech::{SentByte, What};
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, Field, Reply};
@@ -419,8 +419,8 @@ pub(super) const fn wrong(
     MasterDeviation::new(name, section, about, MasterInjection(how))
 }
 
-/// Whether a telegram is the first one behind a check sequence, and for the drive of the one before it or not known yet.
-fn goes_on(spoken: &Spoken) -> bool {
+/// Whether a telegram is the first one after a check sequence, and for the drive of the one before it or not known yet.
+fn goes_on(spoken: &SentByte) -> bool {
     spoken.after_sequence && spoken.drive_before.is_some()
 }
 

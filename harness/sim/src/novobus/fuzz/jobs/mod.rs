@@ -36,7 +36,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
 }
 
 /// Checks that the bytes that a master sent into a ring of `drives` drives obey the manual (ND21 9.1-9.8, 10). If `asked` is given, each
-/// command must be one of these: once, and once more behind each check sequence.
+/// command must be one of these: once, and once more after each check sequence.
 ///
 /// # Errors
 /// The first violation.

@@ -17,7 +17,7 @@ use harness_proto::novobus::master::{CyclePace, Phase};
 /// Byte times after the last order in which every job must have ended: more than 8 recoveries of a ring of six take.
 const BOUND: u64 = 15_000;
 
-/// Byte times behind the last job, in which the master can still report a wrong byte.
+/// Byte times after the last job, in which the master can still report a wrong byte.
 const AFTERWARDS: u64 = 500;
 
 /// Runs a master on the work, and judges it.

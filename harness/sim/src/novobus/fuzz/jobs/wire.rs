@@ -27,7 +27,7 @@ pub(super) enum Back {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Read {
+pub(super) struct WireText {
     /// What must come back, byte by byte.
     pub(super) back: Vec<Back>,
     /// The whole commands: their drives, and what they are.
@@ -36,7 +36,7 @@ pub(super) struct Read {
     pub(super) sequences: usize,
 }
 
-impl Read {
+impl WireText {
     /// Whether every command is one of those asked for, and was not sent too often.
     pub(super) fn asked_for(&self, asked: &[(u8, Command)]) -> Result<(), Lie> {
         for command in &self.commands {
@@ -55,8 +55,8 @@ impl Read {
 }
 
 /// Reads all bytes that were sent into a ring of `drives` drives.
-pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
-    let mut read = Read::default();
+pub(super) fn read(drives: u8, sent: &[u8]) -> Result<WireText, Lie> {
+    let mut read = WireText::default();
     let mut begun: BTreeMap<u8, Vec<u8>> = BTreeMap::new();
     let mut last = None;
     let mut at = 0;
@@ -186,7 +186,7 @@ fn parameter(drive: u8, bytes: &[u8]) -> Result<(Back, Option<Command>), Lie> {
     Ok((back, whole))
 }
 
-/// The first wrong byte that came back; `None` if all are right. Bytes in and behind a check sequence are left out.
+/// The first wrong byte that came back; `None` if all are right. Bytes in and after a check sequence are left out.
 pub(super) fn first_wrong(back: &[Back], heard: &[harness_proto::line::Received]) -> Option<usize> {
     let mut answers: BTreeMap<u8, Checksum> = BTreeMap::new();
     for (index, (back, received)) in back.iter().zip(heard).enumerate() {
