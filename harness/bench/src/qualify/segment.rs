@@ -39,14 +39,13 @@ pub trait Note {
     /// A known way in which a drive may be wrong.
     type Deviation: ?Sized + 'static;
 
-    /// Every known way.
     fn deviations() -> Vec<&'static Self::Deviation>;
 
     /// Its name, section and effect.
     fn words(deviation: &Self::Deviation) -> String;
 
     /// What all buses keep of it.
-    fn noted(&self) -> &Noted;
+    fn noted(&self) -> &AttemptSummary;
 
     /// Its drives, as the header of a scenario names them.
     fn drives(&self) -> Vec<String>;
@@ -60,8 +59,7 @@ pub trait Note {
 
 /// What is kept of an attempt on any bus.
 #[derive(Clone, Debug)]
-pub struct Noted {
-    /// The name of the scenario.
+pub struct AttemptSummary {
     pub name: String,
     /// Its verdict; skipped where the drives were only asked for their registers.
     pub verdict: Verdict,
@@ -77,7 +75,7 @@ pub struct Noted {
     pub was_unanswered: bool,
 }
 
-impl Noted {
+impl AttemptSummary {
     /// Whether the scenario was played, or the drives did not become ready for it.
     #[must_use]
     pub const fn was_tried(&self) -> bool {
@@ -108,15 +106,15 @@ impl<'n, N: Note> Attempts<'n, N> {
         walks: impl Iterator<Item = &'w DriveWalk<S>>,
         inputs: &[&str],
     ) -> Self {
-        let repeats = repeats(parts, |own| (own.noted().name.clone(), own.noted().verdict));
+        let key = |noted: &'n AttemptSummary| (&*noted.name, noted.verdict);
+        let repeats = repeats(parts, |note| key(note.noted()));
         let notes = parts.concat();
-        let verdicts = notes.iter().map(|own| own.noted());
-        let verdicts: Vec<_> = verdicts.map(|own| (&*own.name, own.verdict)).collect();
-        let walks = walks.map(|own| own.told(inputs, CONVERSATION, &verdicts));
+        let verdicts: Vec<_> = notes.iter().map(|note| key(note.noted())).collect();
+        let walks = walks.map(|walk| walk.told(inputs, CONVERSATION, &verdicts));
         let walks = walks.collect();
-        let spoken_for = spoken_for(&notes, |own| {
-            let own = own.noted();
-            (&own.name, own.showed_nothing(), own.was_ready)
+        let spoken_for = spoken_for(&notes, |note| {
+            let noted = note.noted();
+            (&noted.name, noted.showed_nothing(), noted.was_ready)
         });
         Self {
             notes,
@@ -126,14 +124,14 @@ impl<'n, N: Note> Attempts<'n, N> {
         }
     }
 
-    fn attempted(&self) -> Vec<Attempted> {
+    fn attempted(&self) -> Vec<AttemptVerdict> {
         let other = self.repeats.iter().zip(&self.spoken_for);
-        let all = self.notes.iter().map(|own| own.noted()).zip(other);
-        let all = all.map(|(own, (repeats, spoken_for))| Attempted {
-            verdict: own.verdict,
-            accuses: own.accuses && !spoken_for,
-            exact: own.exact,
-            received: own.received,
+        let all = self.notes.iter().map(|note| note.noted()).zip(other);
+        let all = all.map(|(noted, (repeats, spoken_for))| AttemptVerdict {
+            verdict: noted.verdict,
+            accuses: noted.accuses && !spoken_for,
+            exact: noted.exact,
+            received: noted.received,
             repeats: *repeats || *spoken_for,
         });
         all.collect()
@@ -141,10 +139,10 @@ impl<'n, N: Note> Attempts<'n, N> {
 
     /// Each deviation that each drive may have, with the drive and its place.
     fn deviations(&self) -> Vec<(usize, String, &'static N::Deviation)> {
-        let drives = self.notes.first().map_or(Vec::new(), |own| own.drives());
+        let drives = self.notes.first().map_or(Vec::new(), |note| note.drives());
         let each = drives.into_iter().enumerate().flat_map(|(place, drive)| {
             let all = N::deviations().into_iter();
-            all.map(move |own| (place, drive.clone(), own))
+            all.map(move |deviation| (place, drive.clone(), deviation))
         });
         each.collect()
     }
@@ -152,7 +150,7 @@ impl<'n, N: Note> Attempts<'n, N> {
 
 /// One attempt at a scenario.
 #[derive(Clone, Copy, Debug)]
-struct Attempted {
+struct AttemptVerdict {
     verdict: Verdict,
     accuses: bool,
     exact: bool,
@@ -164,7 +162,7 @@ struct Attempted {
 
 /// What the attempts say of the drives.
 #[derive(Debug)]
-enum Named {
+enum Diagnosis {
     /// No attempt accuses a drive.
     None,
     /// Drives did not become ready, and no deviation explains it.
@@ -175,14 +173,14 @@ enum Named {
 
 /// Names the deviations that explain every attempt that accuses a drive, and every one that passed. Where time is virtual, an attempt that
 /// passed counts too if correct drives do not explain what came; but it alone accuses no drive.
-fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[Attempted]) -> Named {
+fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[AttemptVerdict]) -> Diagnosis {
     let both = attempts.iter().zip(&all.notes);
     let right = [Verdict::Passed, Verdict::Skipped];
-    let compared = both.filter(|(own, _)| own.accuses || right.contains(&own.verdict));
-    let (unlike, alike): (Vec<_>, Vec<_>) =
-        compared.partition(|(own, note)| (own.accuses || own.exact) && !note.is_right());
+    let compared = both.filter(|(attempt, _)| attempt.accuses || right.contains(&attempt.verdict));
+    let (unlike, alike): (Vec<_>, Vec<_>) = compared
+        .partition(|(attempt, note)| (attempt.accuses || attempt.exact) && !note.is_right());
     if unlike.is_empty() {
-        return Named::None;
+        return Diagnosis::None;
     }
     let explaining = all
         .deviations()
@@ -198,15 +196,15 @@ fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[Attempted]) -> Named {
             let mut alike = alike.iter();
             could && shown && alike.all(|(_, note)| note.explains(*place, deviation) != Some(false))
         });
-    let explaining = explaining.map(|(_, drive, own)| format!("{drive}: {}", N::words(own)));
+    let explaining = explaining.map(|(_, drive, wrong)| format!("{drive}: {}", N::words(wrong)));
     let explaining: Vec<_> = explaining.collect();
-    let accused = unlike.iter().any(|(own, _)| own.accuses);
-    let unready = unlike.iter().all(|own| own.1.noted().was_unanswered);
+    let accused = unlike.iter().any(|(attempt, _)| attempt.accuses);
+    let unready = unlike.iter().all(|(_, note)| note.noted().was_unanswered);
     match explaining.len() {
-        0 if accused && unready => Named::Unready,
-        1 => Named::Explained(explaining),
-        _ if accused => Named::Explained(explaining),
-        _ => Named::None,
+        0 if accused && unready => Diagnosis::Unready,
+        1 => Diagnosis::Explained(explaining),
+        _ if accused => Diagnosis::Explained(explaining),
+        _ => Diagnosis::None,
     }
 }
 
@@ -214,7 +212,6 @@ fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[Attempted]) -> Named {
 pub struct Point<'p> {
     /// The drive, as the header of a scenario names it.
     pub drive: String,
-    /// The property.
     pub name: &'p str,
     /// The section, with the document.
     pub section: String,
@@ -227,33 +224,33 @@ pub struct Point<'p> {
 fn agreed<'p>(parts: Vec<Vec<Point<'p>>>) -> (Vec<Point<'p>>, Vec<String>) {
     let values = |place: usize| -> BTreeSet<String> {
         let shown = parts.iter().filter_map(|part| part.get(place));
-        shown.filter_map(|own| own.value.clone().ok()).collect()
+        shown.filter_map(|point| point.value.clone().ok()).collect()
     };
     let all: Vec<_> = (0..parts.first().map_or(0, Vec::len)).map(values).collect();
     let mut points = parts.into_iter().next().unwrap_or_default();
     let mut contradictions = Vec::new();
-    for (own, mut values) in points.iter_mut().zip(all) {
+    for (point, mut values) in points.iter_mut().zip(all) {
         if values.len() > 1 {
             let values: Vec<_> = values.into_iter().collect();
             let differ = format!("its values differ from part to part: {}", values.join(", "));
-            contradictions.push(format!("{}, {}: {differ}", own.drive, own.name));
-            own.value = Err(differ);
+            contradictions.push(format!("{}, {}: {differ}", point.drive, point.name));
+            point.value = Err(differ);
         } else if let Some(value) = values.pop_first() {
-            own.value = Ok(value);
+            point.value = Ok(value);
         }
     }
     (points, contradictions)
 }
 
-/// Which attempts of the parts of a qualification, one behind the other, repeat what a part before has played: they have the same name and
+/// Which attempts of the parts of a qualification, in order, repeat what a part before has played: they have the same name and
 /// the same verdict.
-fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<bool> {
+fn repeats<N, K: Ord>(parts: &[Vec<N>], of: impl Fn(&N) -> K) -> Vec<bool> {
     let mut before = BTreeSet::new();
     let mut all = Vec::new();
     for part in parts {
-        let own: Vec<_> = part.iter().map(&of).collect();
-        all.extend(own.iter().map(|own| before.contains(own)));
-        before.extend(own);
+        let attempts: Vec<_> = part.iter().map(&of).collect();
+        all.extend(attempts.iter().map(|attempt| before.contains(attempt)));
+        before.extend(attempts);
     }
     all
 }
@@ -263,18 +260,18 @@ fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<boo
 fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool> {
     let attempts = notes.chunk_by(|one, next| of(one).0 == of(next).0);
     let spoken = attempts.flat_map(|attempts| {
-        let ready = attempts.iter().any(|own| of(own).2);
+        let ready = attempts.iter().any(|note| of(note).2);
         let of = &of;
-        attempts.iter().enumerate().map(move |(place, own)| {
+        attempts.iter().enumerate().map(move |(place, note)| {
             let last = place + 1 == attempts.len();
-            of(own).1 && (!last || ready && !of(own).2)
+            of(note).1 && (!last || ready && !of(note).2)
         })
     });
     spoken.collect()
 }
 
 /// The profile of drives: every point that the manual leaves open, of each drive.
-pub struct Profiled {
+pub struct MergedProfile {
     /// It; `None` where the drives were not asked.
     profile: Option<Profile<ProfileLines>>,
     /// The contradictions between the parts of a qualification, in sentences.
@@ -282,17 +279,17 @@ pub struct Profiled {
 }
 
 /// The profile of the drives of a rig, by the points that each part of a qualification has shown; none where it has not asked the drives.
-pub fn profile((rig, began): (&Rig, &str), mut parts: Vec<Vec<Point<'_>>>) -> Profiled {
+pub fn profile(rig: &Rig, began: &str, mut parts: Vec<Vec<Point<'_>>>) -> MergedProfile {
     parts.retain(|points| !points.is_empty());
     let asked = !parts.is_empty();
     let (points, contradictions) = agreed(parts);
-    Profiled {
-        profile: asked.then(|| of_points((rig, began), points)),
+    MergedProfile {
+        profile: asked.then(|| of_points(rig, began, points)),
         contradictions,
     }
 }
 
-fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<ProfileLines> {
+fn of_points(rig: &Rig, began: &str, points: Vec<Point<'_>>) -> Profile<ProfileLines> {
     let drives = rig.port().map_or(0, |port| port.drives.len());
     let mut profile = Profile {
         schema: 1,
@@ -302,15 +299,15 @@ fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<Prof
         property: BTreeMap::new(),
         open: BTreeMap::new(),
     };
-    for own in points {
-        let drive = &own.drive;
-        match own.value {
+    for point in points {
+        let drive = &point.drive;
+        match point.value {
             Ok(value) => {
-                let line = format!("{drive} property {} = {value}", own.name);
+                let line = format!("{drive} property {} = {value}", point.name);
                 let value = format!("{drive}: {value}");
-                profile.settle(own.name, &own.section, &value, &vec![line]);
+                profile.settle(point.name, &point.section, &value, &vec![line]);
             }
-            Err(why) => profile.leave_open(own.name, &format!("{drive}: {why}")),
+            Err(why) => profile.leave_open(point.name, &format!("{drive}: {why}")),
         }
     }
     profile
@@ -320,63 +317,64 @@ fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<Prof
 /// names. `whole` if everything was played.
 pub fn qualified<N: Note>(
     all: &Attempts<'_, N>,
-    profiled: Profiled,
+    profiled: MergedProfile,
     frames: &str,
     known: &[String],
     whole: bool,
 ) -> Qualified {
-    let Profiled {
+    let MergedProfile {
         profile,
         contradictions,
     } = profiled;
     let attempts = all.attempted();
     let named = named(all, &attempts);
-    let settled = profile.as_ref().map_or(0, |own| own.property.len());
-    let open = profile.as_ref().map_or(0, |own| own.open.len());
-    let counted_once = || attempts.iter().enumerate().filter(|own| !own.1.repeats);
-    let verdicts = |verdict| counted_once().filter(move |own| own.1.verdict == verdict);
+    let settled = profile.as_ref().map_or(0, |profile| profile.property.len());
+    let open = profile.as_ref().map_or(0, |profile| profile.open.len());
+    let numbered = || attempts.iter().enumerate();
+    let counted_once = || numbered().filter(|(_, attempt)| !attempt.repeats);
+    let verdicts = |verdict| counted_once().filter(move |(_, attempt)| attempt.verdict == verdict);
     let failed = verdicts(Verdict::Failed).count();
     let passed = verdicts(Verdict::Passed).count();
-    let unclear = |(place, own): &(usize, &Attempted)| {
+    let unclear = |(place, attempt): &(usize, &AttemptVerdict)| {
         let settled = [Verdict::Passed, Verdict::Failed, Verdict::Skipped];
-        !(settled.contains(&own.verdict) || own.exact && all.notes[*place].is_right())
+        !(settled.contains(&attempt.verdict) || attempt.exact && all.notes[*place].is_right())
     };
     let inconclusive = counted_once().filter(unclear).count();
     let tried = counted_once().count() - verdicts(Verdict::Skipped).count();
-    let received: usize = counted_once().map(|own| own.1.received).sum();
+    let received: usize = counted_once().map(|(_, attempt)| attempt.received).sum();
     let mut text = match &named {
-        Named::Explained(all) if all.is_empty() => {
+        Diagnosis::Explained(all) if all.is_empty() => {
             "deviations: the drives differ from the model, and no single known deviation explains it\n".to_owned()
         }
-        Named::Explained(all) => all
+        Diagnosis::Explained(all) => all
             .iter()
             .take(MOST_TOLD)
-            .map(|own| format!("deviation: {own}\n"))
+            .map(|deviation| format!("deviation: {deviation}\n"))
             .collect(),
-        Named::Unready => {
+        Diagnosis::Unready => {
             "deviations: not known; the drives did not become ready, and no known deviation explains it: the line, its adapter or the computer may be the cause\n".to_owned()
         }
-        Named::None if !contradictions.is_empty() => {
+        Diagnosis::None if !contradictions.is_empty() => {
             "deviations: not known; the parts of the qualification show drives that differ\n"
                 .to_owned()
         }
-        Named::None if inconclusive > 0 || tried == 0 || !whole => {
+        Diagnosis::None if inconclusive > 0 || tried == 0 || !whole => {
             "deviations: not known; no drive is known to be at fault, but not everything was compared and equal\n".to_owned()
         }
-        Named::None if failed > 0 => {
+        Diagnosis::None if failed > 0 => {
             "deviations: not known; attempts failed, and correct drives with other values of what the manual leaves open explain each of them\n".to_owned()
         }
-        Named::None if known.is_empty() => {
+        Diagnosis::None if known.is_empty() => {
             "deviations: none; everything received is as the model of the manual says\n".to_owned()
         }
-        Named::None => format!(
+        Diagnosis::None => format!(
             "deviations: none beside the known ones ({})\n",
             known.join(", ")
         ),
     };
     let several = match &named {
-        Named::Explained(all) => all.len(),
-        Named::Unready | Named::None => 0,
+        Diagnosis::Explained(all) => all.len(),
+        Diagnosis::Unready | Diagnosis::None => 0,
     };
     if several > MOST_TOLD {
         let more = several - MOST_TOLD;
@@ -387,8 +385,8 @@ pub fn qualified<N: Note>(
             "each of these explains everything received: this does not tell which one it is\n",
         );
     }
-    for own in &contradictions {
-        text.push_str(&format!("  {own}\n"));
+    for contradiction in &contradictions {
+        text.push_str(&format!("  {contradiction}\n"));
     }
     text.push_str(&format!(
         "compared: {passed} of {} passed, {failed} failed, {inconclusive} inconclusive; {} received; {settled} of {} settled\n",
@@ -401,16 +399,16 @@ pub fn qualified<N: Note>(
         text.push_str("the run ended before everything was played\n");
     }
     Qualified {
-        profile: profile.map(|own| toml::to_string(&own).unwrap_or_default()),
+        profile: profile.map(|profile| toml::to_string(&profile).unwrap_or_default()),
         deviations: text,
         verdict: match named {
             _ if failed > 0 => Verdict::Failed,
-            Named::Explained(all) if all.len() == 1 => Verdict::Failed,
-            Named::Explained(_) | Named::Unready => Verdict::Inconclusive,
-            Named::None if inconclusive > 0 || !whole || !contradictions.is_empty() => {
+            Diagnosis::Explained(all) if all.len() == 1 => Verdict::Failed,
+            Diagnosis::Explained(_) | Diagnosis::Unready => Verdict::Inconclusive,
+            Diagnosis::None if inconclusive > 0 || !whole || !contradictions.is_empty() => {
                 Verdict::Inconclusive
             }
-            Named::None => Verdict::Passed,
+            Diagnosis::None => Verdict::Passed,
         },
     }
 }
@@ -421,7 +419,7 @@ mod tests {
     use Verdict::{Failed, Inconclusive, Passed};
 
     /// An attempt, whether right drives explain it, and the deviations that do; none where that was not compared.
-    struct Row(Noted, bool, &'static [&'static str]);
+    struct Row(AttemptSummary, bool, &'static [&'static str]);
 
     impl Note for Row {
         type Deviation = str;
@@ -434,7 +432,7 @@ mod tests {
             deviation.to_owned()
         }
 
-        fn noted(&self) -> &Noted {
+        fn noted(&self) -> &AttemptSummary {
             &self.0
         }
 
@@ -454,7 +452,7 @@ mod tests {
     /// Attempts at scenarios with these names.
     fn rows(attempts: &[(&str, Verdict, bool, &'static [&'static str])]) -> Vec<Row> {
         let row = |(name, verdict, right, explain): &(&str, Verdict, bool, &'static [_])| {
-            let noted = Noted {
+            let noted = AttemptSummary {
                 name: (*name).to_owned(),
                 verdict: *verdict,
                 accuses: *verdict == Failed,
@@ -469,15 +467,15 @@ mod tests {
     }
 
     fn found(parts: &[Vec<Row>], contradictions: &[&str]) -> (String, Verdict) {
-        let profiled = Profiled {
+        let profiled = MergedProfile {
             profile: None,
-            contradictions: contradictions.iter().map(|own| (*own).to_owned()).collect(),
+            contradictions: contradictions.iter().copied().map(str::to_owned).collect(),
         };
-        let parts = parts.iter().map(|own| own.iter().collect());
+        let parts = parts.iter().map(|part| part.iter().collect());
         let none = std::iter::empty::<&DriveWalk<u8>>();
         let all = Attempts::new(&parts.collect::<Vec<_>>(), none, &[]);
-        let own = qualified(&all, profiled, "frame", &[], true);
-        (own.deviations, own.verdict)
+        let qualified = qualified(&all, profiled, "frame", &[], true);
+        (qualified.deviations, qualified.verdict)
     }
 
     fn deviations(
@@ -517,7 +515,7 @@ mod tests {
     /// Drives that gave no answer once, and were played on before, are not accused of it: the computer or the line may have been the cause.
     #[test]
     fn an_attempt_speaks_for_one_that_showed_nothing() {
-        let spoken = |attempts: &[(&'static str, bool, bool)]| spoken_for(attempts, |own| *own);
+        let spoken = |attempts: &[(&'static str, bool, bool)]| spoken_for(attempts, |row| *row);
         let (shown, silent, unclear) = (("a", false, true), ("a", true, false), ("a", true, true));
         assert_eq!(spoken(&[silent, shown]), [true, false]);
         assert_eq!(spoken(&[unclear, silent]), [true, true]);
@@ -529,15 +527,15 @@ mod tests {
     /// Nothing is named for drives that nothing accuses.
     #[test]
     fn correct_drives_are_not_named() {
-        let own = deviations(&[("a", Passed, true, &["one"])]);
-        assert!(own.0.starts_with("deviations: none;"), "{}", own.0);
-        assert_eq!(own.1, Passed);
-        let own = deviations(&[
+        let (text, verdict) = deviations(&[("a", Passed, true, &["one"])]);
+        assert!(text.starts_with("deviations: none;"), "{text}");
+        assert_eq!(verdict, Passed);
+        let (text, verdict) = deviations(&[
             ("a", Inconclusive, false, &["one"]),
             ("b", Passed, true, &["two"]),
         ]);
-        assert!(own.0.starts_with("deviations: not known"), "{}", own.0);
-        assert_eq!(own.1, Inconclusive);
+        assert!(text.starts_with("deviations: not known"), "{text}");
+        assert_eq!(verdict, Inconclusive);
     }
 
     fn point(value: Result<&str, &str>) -> Point<'static> {
@@ -553,7 +551,7 @@ mod tests {
     #[test]
     fn a_value_that_differs_from_part_to_part_is_open() {
         let agreed = |values: &[Result<&str, &str>]| {
-            let parts = values.iter().map(|own| vec![point(*own)]);
+            let parts = values.iter().map(|value| vec![point(*value)]);
             let (points, contradictions) = agreed(parts.collect());
             (points[0].value.clone(), contradictions.len())
         };
@@ -570,10 +568,10 @@ mod tests {
     #[test]
     fn parts_that_contradict_each_other_are_never_passed() {
         let passed = rows(&[("a", Passed, true, &["one"])]);
-        let own = found(&[passed], &["drive 1, event-edges: they differ"]);
+        let (text, verdict) = found(&[passed], &["drive 1, event-edges: they differ"]);
         let expected = "deviations: not known; the parts of the qualification show drives that differ\n  drive 1, event-edges: they differ\n";
-        assert!(own.0.starts_with(expected), "{}", own.0);
-        assert_eq!(own.1, Inconclusive);
+        assert!(text.starts_with(expected), "{text}");
+        assert_eq!(verdict, Inconclusive);
     }
 
     /// Drives that did not become ready are not said to differ: the line may be the cause.
@@ -598,26 +596,25 @@ mod tests {
     /// A part of wrong drives and a part of right ones: no deviation explains both.
     #[test]
     fn no_deviation_explains_a_right_and_a_wrong_drive() {
-        let own = deviations(&[
+        let (text, verdict) = deviations(&[
             ("a", Passed, true, &["two"]),
             ("b", Failed, false, &["one"]),
         ]);
         let expected =
             "deviations: the drives differ from the model, and no single known deviation";
-        assert!(own.0.starts_with(expected), "{}", own.0);
-        assert_eq!(own.1, Failed);
+        assert!(text.starts_with(expected), "{text}");
+        assert_eq!(verdict, Failed);
     }
 
     /// What a second part has played again is judged, and counted once; another verdict is counted.
     #[test]
     fn what_parts_repeat_is_counted_once() {
-        let of = |own: &(&str, Verdict)| (own.0.to_owned(), own.1);
         let (passed, failed) = (("state", Passed), ("state", Failed));
-        let own = repeats(&[vec![passed, passed], vec![passed, failed]], of);
-        assert_eq!(own, [false, false, true, false]);
+        let repeated = repeats(&[vec![passed, passed], vec![passed, failed]], |row| *row);
+        assert_eq!(repeated, [false, false, true, false]);
         let part = || rows(&[("state", Passed, true, &["one"])]);
-        let own = found(&[part(), part()], &[]);
+        let (text, _) = found(&[part(), part()], &[]);
         let counts = "compared: 1 of 1 attempt passed, 0 failed, 0 inconclusive; 3 frames received";
-        assert!(own.0.contains(counts), "{}", own.0);
+        assert!(text.contains(counts), "{text}");
     }
 }

@@ -1,6 +1,6 @@
 //! A walk through the states of a model: each of them with each input, as far as the guard admits it.
 //!
-//! A bus supplies a model with its inputs ([`Walked`]). What is planned depends on the model and on what the rig's file permits, and on
+//! A bus supplies a model with its inputs ([`WalkModel`]). What is planned depends on the model and on what the rig's file permits, and on
 //! nothing that a drive has sent: a record names the same conversations when it is judged again.
 
 use crate::scenario::source::Source;
@@ -9,11 +9,10 @@ use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A right drive as it is before the next input, behind the guard that judges what is sent to it.
-pub trait Walked: Clone {
+pub trait WalkModel: Clone {
     /// By what its states differ.
     type State: Ord + Clone;
 
-    /// The state that it is in.
     fn state(&self) -> Self::State;
 
     /// Whether an input means something in the state that it is in. One that does not makes no pair with the state.
@@ -42,8 +41,7 @@ pub struct WalkBounds {
 
 /// A conversation of a walk, which begins at its start.
 #[derive(Debug)]
-pub struct WalkedPart<S> {
-    /// Its lines.
+pub struct WalkPart<S> {
     pub lines: Vec<String>,
     /// Which inputs it puts for the first time, by state.
     pub walked: BTreeSet<(S, usize)>,
@@ -52,8 +50,7 @@ pub struct WalkedPart<S> {
 /// A walk.
 #[derive(Debug)]
 pub struct Walk<S> {
-    /// Its conversations.
-    pub parts: Vec<WalkedPart<S>>,
+    pub parts: Vec<WalkPart<S>>,
     /// Pairs of a state and an input that are left out, by the reason.
     pub denied: BTreeMap<String, BTreeSet<(S, usize)>>,
     /// Those that were not reached within the bounds.
@@ -61,11 +58,11 @@ pub struct Walk<S> {
 }
 
 /// A walk of a model from where it stands with this number of inputs, to what none of these parts has walked.
-pub fn walk<M: Walked>(
+pub fn walk<M: WalkModel>(
     start: &M,
     inputs: usize,
     bounds: WalkBounds,
-    before: &[WalkedPart<M::State>],
+    before: &[WalkPart<M::State>],
 ) -> Walk<M::State> {
     let before = before.iter().flat_map(|part| part.walked.iter().cloned());
     let mut walker = Walker {
@@ -104,8 +101,8 @@ struct Walker<S> {
 
 impl<S: Ord + Clone> Walker<S> {
     /// One conversation; it walks nothing where nothing is left that can be reached.
-    fn conversation<M: Walked<State = S>>(&mut self, model: &mut M, most: Span) -> WalkedPart<S> {
-        let mut part = WalkedPart {
+    fn conversation<M: WalkModel<State = S>>(&mut self, model: &mut M, most: Span) -> WalkPart<S> {
+        let mut part = WalkPart {
             lines: Vec::new(),
             walked: BTreeSet::new(),
         };
@@ -119,7 +116,7 @@ impl<S: Ord + Clone> Walker<S> {
             };
             let mut there = model.clone();
             match there.put(input) {
-                Ok(own) => part.lines.extend(own),
+                Ok(lines) => part.lines.extend(lines),
                 Err(why) => {
                     let denied = self.walk.denied.entry(why).or_default();
                     denied.insert((here, input));
@@ -140,7 +137,7 @@ impl<S: Ord + Clone> Walker<S> {
     }
 
     /// Finds out where each input leads from a state that the model is in for the first time.
-    fn explore<M: Walked<State = S>>(&mut self, model: &M, here: &S) {
+    fn explore<M: WalkModel<State = S>>(&mut self, model: &M, here: &S) {
         if self.ways.contains_key(here) {
             return;
         }
@@ -233,7 +230,7 @@ impl<S: Ord + Clone> Walker<S> {
 }
 
 impl<S: Ord> Walk<S> {
-    /// This walk, and behind it another one, which began where more is permitted.
+    /// This walk, and after it another one, which began where more is permitted.
     #[must_use]
     pub fn then(mut self, other: Self) -> Self {
         self.parts.extend(other.parts);
@@ -262,7 +259,7 @@ impl<S: Ord> Walk<S> {
             .iter()
             .enumerate()
             .partition(|(place, _)| played(*place));
-        let count = |parts: &[(usize, &WalkedPart<S>)]| -> usize {
+        let count = |parts: &[(usize, &WalkPart<S>)]| -> usize {
             parts.iter().map(|(_, part)| part.walked.len()).sum()
         };
         let (walked, skipped) = (count(&played), count(&skipped));
@@ -298,7 +295,6 @@ impl<S: Ord> Walk<S> {
 pub struct DriveWalk<S> {
     /// The drive as a scenario names it, such as `slave 8`; nothing where it is alone.
     pub drive: String,
-    /// Its walk.
     pub walk: Walk<S>,
 }
 
@@ -325,7 +321,7 @@ impl<S: Ord> DriveWalk<S> {
             let name = format!("{prefix}{}", self.name(place));
             let judged = [Verdict::Passed, Verdict::Failed];
             let mut attempts = attempts.iter();
-            attempts.any(|(own, verdict)| *own == name && judged.contains(verdict))
+            attempts.any(|(attempt, verdict)| *attempt == name && judged.contains(verdict))
         });
         format!("{} {told}", self.drive).trim_start().to_owned()
     }
@@ -339,7 +335,7 @@ mod tests {
     #[derive(Clone)]
     struct Door(u8, Instant);
 
-    impl Walked for Door {
+    impl WalkModel for Door {
         type State = u8;
 
         fn state(&self) -> u8 {
@@ -382,13 +378,13 @@ mod tests {
             conversation: Span::from_millis(1_000),
             all: Span::from_millis(10_000),
         };
-        let own = of(bounds);
-        assert_eq!(walked(&own), 9, "{own:?}");
-        assert_eq!(own.denied["needs a hammer"].len(), 3);
-        assert!(own.left.is_empty(), "{own:?}");
-        assert_eq!(own.parts.len(), 1);
-        // Nothing is new behind it.
-        let again = walk(&Door(0, Instant::START), 5, bounds, &own.parts);
+        let planned = of(bounds);
+        assert_eq!(walked(&planned), 9, "{planned:?}");
+        assert_eq!(planned.denied["needs a hammer"].len(), 3);
+        assert!(planned.left.is_empty(), "{planned:?}");
+        assert_eq!(planned.parts.len(), 1);
+        // Nothing is new after it.
+        let again = walk(&Door(0, Instant::START), 5, bounds, &planned.parts);
         assert!(again.parts.is_empty(), "{again:?}");
     }
 
@@ -412,18 +408,18 @@ mod tests {
 
     #[test]
     fn what_was_not_walked_is_said() {
-        let own = of(WalkBounds {
+        let planned = of(WalkBounds {
             conversation: Span::from_millis(60),
             all: Span::from_millis(10_000),
         });
         let names = ["a look", "a push", "a turn of the key", "a blow", "a word"];
-        let all = own.told(&names, |_| true);
+        let all = planned.told(&names, |_| true);
         assert_eq!(
             all,
             "walked: 9 of 12 pairs of a state and an input\n  3 left out, needs a hammer: a blow\n"
         );
-        let first = own.told(&names, |place| place == 0);
-        let skipped = 9 - own.parts[0].walked.len();
+        let first = planned.told(&names, |place| place == 0);
+        let skipped = 9 - planned.parts[0].walked.len();
         assert!(
             first.contains(&format!("{skipped} in conversations without a verdict")),
             "{first}"
@@ -437,12 +433,12 @@ mod tests {
             conversation: Span::from_millis(1_000),
             all: Span::from_millis(10_000),
         });
-        let own = DriveWalk {
+        let drive = DriveWalk {
             drive: "slave 8".to_owned(),
             walk,
         };
         let names = ["a look", "a push", "a turn of the key", "a blow", "a word"];
-        let walked = |verdict| own.told(&names, "q-", &[("q-walk-1-slave-8", verdict)]);
+        let walked = |verdict| drive.told(&names, "q-", &[("q-walk-1-slave-8", verdict)]);
         for verdict in [Verdict::Passed, Verdict::Failed] {
             let told = walked(verdict);
             assert!(told.starts_with("slave 8 walked: 9 of 12 "), "{told}");

@@ -49,7 +49,7 @@ pub trait RightDrive: Clone {
     /// Takes the next piece that it sends now.
     fn say(&mut self) -> Option<Self::Piece>;
 
-    /// Whether the last piece that was taken may leave later than what the drive says by itself behind it.
+    /// Whether the last piece that was taken may leave later than what the drive says by itself after it.
     fn may_wait(&self) -> bool {
         false
     }
@@ -73,7 +73,7 @@ pub trait RightDrive: Clone {
 
 /// A piece and when it can have been on the bus, on the computer's clock.
 #[derive(Clone, Debug)]
-pub struct Timed<P> {
+pub struct TimedPiece<P> {
     pub earliest: Instant,
     pub latest: Instant,
     pub piece: P,
@@ -84,7 +84,7 @@ pub struct Timed<P> {
 pub enum Judged<P> {
     /// A right drive could have sent this.
     Right,
-    /// No right drive could: the place of the first piece that it would not have sent, which is behind the last one where a piece is
+    /// No right drive could: the place of the first piece that it would not have sent, which is after the last one where a piece is
     /// missing; and what the last world would have sent.
     Wrong(usize, Option<P>),
     /// There are more worlds than are kept.
@@ -97,9 +97,9 @@ pub enum Judged<P> {
 #[derive(Clone, Debug)]
 pub struct Dialogue<P> {
     /// What was sent to it, in order.
-    pub sent: Vec<Timed<P>>,
+    pub sent: Vec<TimedPiece<P>>,
     /// What came from it, in order.
-    pub came: Vec<Timed<P>>,
+    pub came: Vec<TimedPiece<P>>,
     /// How many pieces had been sent when each that came was read: it is no answer to later ones. Empty where that is not known.
     pub asked: Vec<usize>,
     /// Up to when all that came was read.
@@ -131,14 +131,14 @@ struct World<M: RightDrive> {
     /// When it did something by itself for the last time.
     stirred: i64,
     /// What it has said that has not come so far.
-    said: VecDeque<Said<M::Piece>>,
+    said: VecDeque<DrivePiece<M::Piece>>,
     /// The places of the pieces that were lost or whose answers were, in what was sent.
     lost: Vec<usize>,
 }
 
 /// A piece that a world has said.
 #[derive(Clone, Debug)]
-struct Said<P> {
+struct DrivePiece<P> {
     /// When, on its own clock.
     at: i64,
     /// How many pieces it had heard.
@@ -149,12 +149,12 @@ struct Said<P> {
 
 /// Worlds that have heard and lost the same number of pieces, are in the same state and have said the same, as long ago, do the same from now
 /// on.
-type Same<P> = (usize, usize, u64, Vec<(i64, P)>);
+type MergeKey<P> = (usize, usize, u64, Vec<(i64, P)>);
 
 impl<M: RightDrive> World<M> {
-    fn same(&self) -> Same<M::Piece> {
+    fn same(&self) -> MergeKey<M::Piece> {
         let said = self.said.iter();
-        let said = said.map(|own| (self.at - own.at, own.piece.clone()));
+        let said = said.map(|said| (self.at - said.at, said.piece.clone()));
         let lost = self.lost.len();
         (self.heard, lost, self.model.state(), said.collect())
     }
@@ -163,17 +163,17 @@ impl<M: RightDrive> World<M> {
     fn losing(&self, most: usize) -> Option<Self> {
         let said = self.said.front().filter(|_| self.lost.len() < most)?;
         let lost = said.heard.saturating_sub(1);
-        let mut own = self.clone();
-        own.said.pop_front();
-        own.lost.push(lost);
-        Some(own)
+        let mut world = self.clone();
+        world.said.pop_front();
+        world.lost.push(lost);
+        Some(world)
     }
 
     /// The world in which the line has added something: the answer to the last piece counts as lost.
     fn adding(&self) -> Self {
-        let mut own = self.clone();
-        own.lost.push(own.heard.saturating_sub(1));
-        own
+        let mut world = self.clone();
+        world.lost.push(world.heard.saturating_sub(1));
+        world
     }
 
     /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
@@ -183,13 +183,13 @@ impl<M: RightDrive> World<M> {
     }
 
     /// The world that has waited, its own clock like that of the computer, until what can reach it between these times.
-    fn waiting(&self, (earliest, latest): (i64, i64)) -> Option<Self> {
+    fn waiting(&self, earliest: i64, latest: i64) -> Option<Self> {
         let (scan, begun) = (units_of(M::SCAN), earliest.max(self.at + self.ahead.0));
-        let mut own = self.clone();
-        own.at += (begun - self.at).max(0) / scan * scan;
-        own.ahead = (begun - own.at, latest - own.at);
-        own.model.advance(instant(own.at));
-        own.within(i64::MIN, i64::MAX)
+        let mut world = self.clone();
+        world.at += (begun - self.at).max(0) / scan * scan;
+        world.ahead = (begun - world.at, latest - world.at);
+        world.model.advance(instant(world.at));
+        world.within(i64::MIN, i64::MAX)
     }
 
     /// Takes another world in that does the same, at another time of its own clock. Returns whether the times of both are one interval: where
@@ -210,13 +210,13 @@ impl<M: RightDrive> World<M> {
     fn stirs(&self) -> bool {
         let near = units_of(M::SCAN) * SOON;
         let due = self.model.due().map(units);
-        let soon = due.is_some_and(|own| own <= self.at + near);
+        let soon = due.is_some_and(|due| due <= self.at + near);
         soon || self.at <= self.stirred.saturating_add(near) || due.is_some() && !self.model.rests()
     }
 
     fn listen(&mut self) {
         while let Some(piece) = self.model.say() {
-            self.said.push_back(Said {
+            self.said.push_back(DrivePiece {
                 at: self.at,
                 heard: self.heard,
                 may_wait: self.model.may_wait(),
@@ -229,7 +229,7 @@ impl<M: RightDrive> World<M> {
         let drift = (to - self.at) / M::DRIFT;
         self.ahead = (self.ahead.0 - drift, self.ahead.1 + drift);
         self.at = to;
-        if self.model.due().is_some_and(|own| units(own) <= to) {
+        if self.model.due().is_some_and(|due| units(due) <= to) {
             self.stirred = to;
         }
         self.model.advance(instant(to));
@@ -248,11 +248,11 @@ fn instant(at: i64) -> Instant {
 /// The place of a world: how many pieces it has heard, when, and its number.
 type Place = (usize, i64, usize);
 
-/// Worlds of which no two do the same, the earliest first: what follows from one comes behind it.
+/// Worlds of which no two do the same, the earliest first: what follows from one comes after it.
 struct Worlds<M: RightDrive> {
     all: BTreeMap<Place, World<M>>,
     /// Where those stand that do the same. A place at which none stands any more stays.
-    same: HashMap<Same<M::Piece>, Vec<Place>>,
+    same: HashMap<MergeKey<M::Piece>, Vec<Place>>,
     numbers: usize,
 }
 
@@ -268,7 +268,7 @@ impl<M: RightDrive> Worlds<M> {
     fn insert(&mut self, world: World<M>) {
         let same = self.same.entry(world.same()).or_default();
         let all = &mut self.all;
-        let merges = |place| all.get_mut(place).is_some_and(|own| own.merge(&world));
+        let merges = |place| all.get_mut(place).is_some_and(|kept| kept.merge(&world));
         if !same.iter().any(merges) {
             let place = (world.heard, world.at, self.numbers);
             self.numbers += 1;
@@ -278,7 +278,7 @@ impl<M: RightDrive> Worlds<M> {
     }
 
     fn pop_first(&mut self) -> Option<World<M>> {
-        self.all.pop_first().map(|own| own.1)
+        self.all.pop_first().map(|(_, world)| world)
     }
 }
 
@@ -320,31 +320,31 @@ pub fn lost<M: RightDrive>(
 ) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
     // When a piece has reached a drive seldom matters: a few worlds may explain what came.
     for heard in [
-        Heard::AtOnce,
-        Heard::BeforeItsStep,
-        Heard::RepeatsBeforeItsStep,
+        HearingTime::AtOnce,
+        HearingTime::BeforeItsStep,
+        HearingTime::RepeatsBeforeItsStep,
     ] {
-        match lost_in(model.clone(), talk, (heard, alive)) {
+        match lost_in(model.clone(), talk, heard, alive) {
             Err((Judged::Wrong(..) | Judged::TooMany, _)) => {}
             found => return found,
         }
     }
-    lost_in(model, talk, (Heard::AtAnyTime, alive))
+    lost_in(model, talk, HearingTime::AtAnyTime, alive)
 }
 
 /// When a drive hears a piece, in the worlds that are tried.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Heard {
+enum HearingTime {
     /// At one time.
     AtOnce,
-    /// At one time before it next does something by itself, or behind that.
+    /// At one time before it next does something by itself, or after that.
     BeforeItsStep,
     /// The same for a piece that repeats the one before it; any other at any time.
     RepeatsBeforeItsStep,
     AtAnyTime,
 }
 
-impl Heard {
+impl HearingTime {
     /// Whether a piece is heard at one time before a step; `repeats` says whether it repeats the one before it.
     fn is_once(self, repeats: impl Fn() -> bool) -> bool {
         match self {
@@ -359,7 +359,8 @@ impl Heard {
 fn lost_in<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
-    (heard, alive): (Heard, &dyn Fn()),
+    heard: HearingTime,
+    alive: &dyn Fn(),
 ) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
@@ -392,23 +393,23 @@ fn lost_in<M: RightDrive>(
                 continue;
             }
             let came = talk.came.get(place);
-            let damaged = came.is_some_and(|own| M::is_damaged(&own.piece));
+            let damaged = came.is_some_and(|came| M::is_damaged(&came.piece));
             if damaged && world.lost.len() < talk.most_lost {
                 explained.insert(world.adding());
             }
-            if let Some(own) = world.losing(talk.most_lost) {
+            if let Some(losing) = world.losing(talk.most_lost) {
                 steps += 1;
                 if damaged {
-                    explained.insert(own.clone());
+                    explained.insert(losing.clone());
                 }
-                worlds.insert(own);
+                worlds.insert(losing);
             }
             let mut explains = |world| explained.insert(world);
             let last = talk.say(&world, place, &mut explains);
             if last {
                 continue;
             }
-            for next in talk.next(world, (place, heard), &mut explains) {
+            for next in talk.next(world, place, heard, &mut explains) {
                 steps += 1;
                 worlds.insert(next);
             }
@@ -418,18 +419,18 @@ fn lost_in<M: RightDrive>(
         }
         worlds = explained;
     }
-    let lost = worlds.all.into_values().map(|own| own.lost);
+    let lost = worlds.all.into_values().map(|world| world.lost);
     Ok(lost.min_by_key(Vec::len).unwrap_or_default())
 }
 
 impl<P: Clone + Eq + Hash> Dialogue<P> {
     /// Whether the piece that was sent at a place is the same as the one before.
     fn repeats(&self, place: usize) -> bool {
-        let before = place.checked_sub(1).and_then(|own| self.sent.get(own));
-        let own = self.sent.get(place);
+        let before = place.checked_sub(1).and_then(|place| self.sent.get(place));
+        let sent = self.sent.get(place);
         before
-            .zip(own)
-            .is_some_and(|(before, own)| before.piece == own.piece)
+            .zip(sent)
+            .is_some_and(|(before, sent)| before.piece == sent.piece)
     }
 
     /// Whether a world cannot have sent what came at a place, whatever it does from now on: what it has said before would have come first.
@@ -448,7 +449,7 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         false
     }
 
-    /// Where what a world has said is what came at a place, the world behind it. Returns whether it can do nothing else before that.
+    /// Where what a world has said is what came at a place, the world after it. Returns whether it can do nothing else before that.
     fn say<M: RightDrive<Piece = P>>(
         &self,
         world: &World<M>,
@@ -461,20 +462,20 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         };
         let Some(came) = self.came.get(place) else {
             // It may come later than the computer has listened.
-            let own = world.clone();
-            let own = own.within(units(self.end) - lag - first.at, i64::MAX);
-            let comes = own.filter(|_| !self.complete);
-            comes.into_iter().for_each(explained);
+            let late = world.clone();
+            let late = late.within(units(self.end) - lag - first.at, i64::MAX);
+            let late = late.filter(|_| !self.complete);
+            late.into_iter().for_each(explained);
             return true;
         };
         let earliest = units(came.earliest) - lag - scan;
         for (number, said) in world.said.iter().enumerate() {
             if world.model.is(&said.piece, &came.piece) {
-                let mut own = world.clone();
-                own.said.remove(number);
+                let mut after = world.clone();
+                after.said.remove(number);
                 let latest = units(came.latest) + scan;
-                let own = own.within(earliest - said.at, latest - said.at);
-                own.into_iter().for_each(&mut *explained);
+                let after = after.within(earliest - said.at, latest - said.at);
+                after.into_iter().for_each(&mut *explained);
             }
             let late = first.at + world.ahead.1 < earliest;
             if !(said.may_wait && self.overtakes) || late {
@@ -489,14 +490,15 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
     fn next<M: RightDrive<Piece = P>>(
         &self,
         world: World<M>,
-        (place, heard): (usize, Heard),
+        place: usize,
+        heard: HearingTime,
         ended: &mut impl FnMut(World<M>),
     ) -> Vec<World<M>> {
         let mut all = Vec::new();
         let mut hears = false;
         let scan = units_of(M::SCAN);
         let came = self.came.get(place);
-        let end = came.map_or(self.end, |own| own.latest);
+        let end = came.map_or(self.end, |came| came.latest);
         let end = units(end) + scan;
         let due = world.model.due().map(units);
         let asked = self.asked.get(place).copied().unwrap_or(usize::MAX);
@@ -514,13 +516,13 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                 }
                 // It makes none before its next step.
                 Some(due) if rests(due) => {
-                    let waited = world.waiting((earliest - scan, latest + scan));
-                    all.extend(waited.map(|own| World {
+                    let waited = world.waiting(earliest - scan, latest + scan);
+                    all.extend(waited.map(|waited| World {
                         ahead: (
-                            own.ahead.0.min(world.ahead.0),
-                            own.ahead.1.max(world.ahead.1),
+                            waited.ahead.0.min(world.ahead.0),
+                            waited.ahead.1.max(world.ahead.1),
                         ),
-                        ..own
+                        ..waited
                     }));
                 }
                 Some(due) => {
@@ -534,56 +536,56 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                         last = last.min(first);
                     }
                     for at in (first..=last).step_by(M::SCAN.units() as usize) {
-                        let own = world.clone();
-                        if let Some(mut own) = own.within(earliest - scan - at, latest + scan - at)
-                        {
-                            own.advance(at);
-                            all.push(own);
+                        let hearing = world.clone();
+                        let hearing = hearing.within(earliest - scan - at, latest + scan - at);
+                        if let Some(mut hearing) = hearing {
+                            hearing.advance(at);
+                            all.push(hearing);
                         }
                     }
                 }
             }
             let mut parted = Vec::new();
-            for own in &mut all {
-                let model = own.model.hear_parted(instant(own.at), &sent.piece);
+            for hearing in &mut all {
+                let model = hearing.model.hear_parted(instant(hearing.at), &sent.piece);
                 parted.extend(model.map(|model| World {
                     model,
-                    ..own.clone()
+                    ..hearing.clone()
                 }));
-                own.model.hear(instant(own.at), &sent.piece);
+                hearing.model.hear(instant(hearing.at), &sent.piece);
             }
             all.extend(parted);
             hears = !all.is_empty();
-            for own in &mut all {
-                own.heard += 1;
-                own.listen();
+            for hearing in &mut all {
+                hearing.heard += 1;
+                hearing.listen();
             }
             if self.loses_sent && world.lost.len() < self.most_lost {
-                let mut own = world.clone();
-                own.lost.push(own.heard);
-                own.heard += 1;
-                all.push(own);
+                let mut losing = world.clone();
+                losing.lost.push(losing.heard);
+                losing.heard += 1;
+                all.push(losing);
             }
         }
-        let unheard = sent.map_or(i64::MAX, |own| units(own.latest) + scan);
+        let unheard = sent.map_or(i64::MAX, |sent| units(sent.latest) + scan);
         let may_end = came.is_none() && !(self.complete && sent.is_some());
         if may_end && unheard.min(due.map_or(i64::MAX, |due| due + world.ahead.1)) >= end {
             ended(world.clone());
         }
-        let waits = heard != Heard::AtOnce || !hears;
+        let waits = heard != HearingTime::AtOnce || !hears;
         if let Some(due) = due.filter(|_| waits)
-            && let Some(mut own) = world.within(i64::MIN, unheard.min(end) - due)
+            && let Some(mut stepping) = world.within(i64::MIN, unheard.min(end) - due)
         {
-            own.advance(due);
+            stepping.advance(due);
             // Nothing can happen to it in between.
-            let until = sent.map_or(end, |own| units(own.earliest).min(end)) - scan;
-            while own.said.is_empty()
-                && let Some(due) = own.model.due().map(units)
-                && due + (due - own.at) / M::DRIFT + own.ahead.1 < until
+            let until = sent.map_or(end, |sent| units(sent.earliest).min(end)) - scan;
+            while stepping.said.is_empty()
+                && let Some(due) = stepping.model.due().map(units)
+                && due + (due - stepping.at) / M::DRIFT + stepping.ahead.1 < until
             {
-                own.advance(due);
+                stepping.advance(due);
             }
-            all.push(own);
+            all.push(stepping);
         }
         all
     }

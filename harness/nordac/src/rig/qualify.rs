@@ -196,7 +196,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let walks = walks.iter().map(|walk| &walk.1);
     let attempts = Attempts::new(&notes, walks, &names());
     let shown = known.iter().map(|(known, limits)| points(known, limits));
-    let profile = profile((rig, began), shown.map(Iterator::collect).collect());
+    let profile = profile(rig, began, shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|wrong| wrong.name.clone());
     let named: Vec<_> = named.collect();
     qualified(&attempts, profile, "telegram", &named, whole)

@@ -5,7 +5,7 @@
 
 use super::RigSlave;
 use super::values::values;
-use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, walk};
+use harness_bench::qualify::walk::{Walk, WalkBounds, WalkModel, walk};
 use harness_proto::nordac::guard::{Denial, Gate, GuardedSlave, Limits};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Image, Parameter, Pkw, Task};
@@ -25,12 +25,12 @@ const BOUNDS: WalkBounds = WalkBounds {
 /// How long an exchange takes behind an adapter, at most, in ms (our choice).
 const EXCHANGE: u64 = 4;
 
-/// How often a task is sent: its answer comes with the second reply behind it.
+/// How often a task is sent: its answer comes with the second reply after it.
 const ANSWERED: usize = 3;
 
 /// What an exchange brings to an inverter.
 #[derive(Clone, Copy)]
-enum Put {
+enum ExchangeInput {
     /// A control word.
     Word(u16),
     /// A main setpoint; 4000 hex is 100 % (3.2.3).
@@ -41,10 +41,10 @@ enum Put {
     Value(&'static Parameter, i32, Option<&'static str>),
 }
 
-use Put::{Read, Setpoint, Value, Word};
+use ExchangeInput::{Read, Setpoint, Value, Word};
 
 /// An input of a walk: its name, and what it is.
-type Input = (&'static str, Put);
+type Input = (&'static str, ExchangeInput);
 
 /// The inputs of a walk beside the values of parameters.
 const INPUTS: [Input; 22] = [
@@ -147,7 +147,7 @@ impl Model {
 
     /// A task that reads a parameter.
     fn read(&mut self, number: u16) -> Result<Vec<String>, String> {
-        let ak = Parameter::of(number).map_or(1, |own| Task::read(own).ak());
+        let ak = Parameter::of(number).map_or(1, |parameter| Task::read(parameter).ak());
         self.task(Pkw::of(ak, number, 0, 0))
     }
 
@@ -183,7 +183,7 @@ impl Model {
     }
 }
 
-impl Walked for Model {
+impl WalkModel for Model {
     type State = State;
 
     fn state(&self) -> State {
@@ -349,8 +349,8 @@ mod tests {
                 name: "walk".to_owned(),
                 text: walked(SLAVE, &part.lines).into(),
             };
-            let own = RigScenario::read(&source).expect("a conversation");
-            let mut slaves = own.plan.setup.slaves.clone();
+            let scenario = RigScenario::read(&source).expect("a conversation");
+            let mut slaves = scenario.plan.setup.slaves.clone();
             slaves[0].deviation = deviates.map(|name| DEVIATIONS.named(name).expect("a deviation"));
             let rate = BusRate::K500;
             let setup = Setup {
@@ -359,7 +359,7 @@ mod tests {
                 master: None,
             };
             let mut bench = Bench::new(&setup);
-            let outcome = play(&own.plan, &mut bench, AtMismatch::GoOn);
+            let outcome = play(&scenario.plan, &mut bench, AtMismatch::GoOn);
             format!("{:?} {:?}", outcome.verdict, bench.trace(0))
         });
         sent.collect()

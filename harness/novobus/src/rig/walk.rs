@@ -10,7 +10,7 @@ mod tests;
 use super::limits;
 use crate::language::read::RingScenario;
 use crate::qualify::some_drives;
-use harness_bench::qualify::walk::{DriveWalk, Walk, WalkBounds, WalkedPart, walk};
+use harness_bench::qualify::walk::{DriveWalk, Walk, WalkBounds, WalkPart, walk};
 use harness_bench::rig::Rig;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nd21::ram;
@@ -167,7 +167,7 @@ fn permitted(
     mut model: Model,
     bounds: WalkBounds,
     limits: &Limits,
-    before: &[WalkedPart<State>],
+    before: &[WalkPart<State>],
 ) -> Walk<State> {
     let mut needs = Vec::new();
     let mut first = Vec::new();

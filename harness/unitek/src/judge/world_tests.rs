@@ -3,7 +3,7 @@
 use super::World;
 use super::tests::{of_all, scenarios};
 use crate::language::Unitek;
-use harness_bench::qualify::worlds::{Dialogue, Judged, Timed, judge};
+use harness_bench::qualify::worlds::{Dialogue, Judged, TimedPiece, judge};
 use harness_bench::scenario::run::AtMismatch;
 use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
@@ -49,7 +49,7 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
             // Its true time is anywhere in between.
             let part = place as u64 * 7 % 11;
             let before = Span::from_units(late.units() / 10 * part);
-            Timed {
+            TimedPiece {
                 earliest: frame.at - before,
                 latest: frame.at + late.saturating_sub(before),
                 piece: frame.frame,
@@ -154,7 +154,7 @@ fn which_wrong_drives_are_found_by_what_they_send() {
 fn an_event_that_never_comes_is_missed() {
     let setup = crate::simulate::Setup::of(1);
     let at = |ms: u64| Instant::START + Span::from_millis(ms);
-    let timed = |ms: u64, text: &str| Timed {
+    let timed = |ms: u64, text: &str| TimedPiece {
         earliest: at(ms),
         latest: at(ms + 3),
         piece: text.parse::<Frame>().expect("a frame"),

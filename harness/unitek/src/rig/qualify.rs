@@ -49,7 +49,7 @@ const PRINTED_TO_SEND: RangeInclusive<u16> = 0x181..=0x1FF;
 
 /// What a probe needs that is not made by default.
 #[derive(Clone, Copy)]
-enum Needs {
+enum Need {
     /// Nothing: reads, cycles, STATUS_MASK and the lock.
     Nothing,
     /// Motors may turn.
@@ -69,46 +69,46 @@ enum Needs {
 }
 
 /// What the probe of a property needs, and the conversation whose frames show it; nothing for those that are not listed.
-const NEEDS: [(&str, Needs, &str); 14] = [
-    ("id-change", Needs::BusSettings, "write-identifier"),
-    ("id-range", Needs::BusSettings, "write-identifier-range"),
-    ("event-mask", Needs::PowerUp, ""),
-    ("lock-at-power-up", Needs::PowerUp, ""),
-    ("power-up-mode", Needs::PowerUp, ""),
-    ("lock-clears-command", Needs::Motion, "lock-and-commands"),
-    ("homing-time", Needs::Motion, ""),
-    ("time-out-clear", Needs::MotionAndBusSettings, ""),
-    ("enable-after-lock", Needs::MotionAndBusSettings, ""),
-    ("reply-delay", Needs::ExactTime, ""),
-    ("interval-accuracy", Needs::ExactTime, ""),
-    ("wide-replies", Needs::BusSettings, ""),
-    ("rate-change", Needs::OtherAdapter, ""),
-    ("second-identifiers", Needs::BusSettingsAndPowerUp, ""),
+const NEEDS: [(&str, Need, &str); 14] = [
+    ("id-change", Need::BusSettings, "write-identifier"),
+    ("id-range", Need::BusSettings, "write-identifier-range"),
+    ("event-mask", Need::PowerUp, ""),
+    ("lock-at-power-up", Need::PowerUp, ""),
+    ("power-up-mode", Need::PowerUp, ""),
+    ("lock-clears-command", Need::Motion, "lock-and-commands"),
+    ("homing-time", Need::Motion, ""),
+    ("time-out-clear", Need::MotionAndBusSettings, ""),
+    ("enable-after-lock", Need::MotionAndBusSettings, ""),
+    ("reply-delay", Need::ExactTime, ""),
+    ("interval-accuracy", Need::ExactTime, ""),
+    ("wide-replies", Need::BusSettings, ""),
+    ("rate-change", Need::OtherAdapter, ""),
+    ("second-identifiers", Need::BusSettingsAndPowerUp, ""),
 ];
 
 fn why_open(property: &Description, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
-    let why = match needs.map_or(Needs::Nothing, |(_, needs, _)| *needs) {
-        Needs::Motion | Needs::MotionAndBusSettings if !limits.motion => {
+    let why = match needs.map_or(Need::Nothing, |(_, needs, _)| *needs) {
+        Need::Motion | Need::MotionAndBusSettings if !limits.motion => {
             "not asked: this needs `allow_motion` in [limits] and --allow-motion"
         }
-        Needs::BusSettings | Needs::BusSettingsAndPowerUp | Needs::MotionAndBusSettings
+        Need::BusSettings | Need::BusSettingsAndPowerUp | Need::MotionAndBusSettings
             if !limits.bus_settings =>
         {
             "not asked: this needs `allow_bus_settings` in [limits]"
         }
-        Needs::Motion | Needs::MotionAndBusSettings => {
+        Need::Motion | Need::MotionAndBusSettings => {
             "the drive did not show it: its hardware enable is open, or it is not ready"
         }
-        Needs::BusSettingsAndPowerUp => {
+        Need::BusSettingsAndPowerUp => {
             "it does not use them at once; whether it does later shows when it is switched on"
         }
-        Needs::PowerUp => "not asked: it shows when the drive is switched on",
-        Needs::ExactTime => "not asked: the adapter and the computer take time, too",
-        Needs::OtherAdapter => {
+        Need::PowerUp => "not asked: it shows when the drive is switched on",
+        Need::ExactTime => "not asked: the adapter and the computer take time, too",
+        Need::OtherAdapter => {
             "not asked: the drive could be brought back only by an adapter with another bit rate"
         }
-        Needs::Nothing | Needs::BusSettings => "the drive has shown no value that is known",
+        Need::Nothing | Need::BusSettings => "the drive has shown no value that is known",
     };
     why.to_owned()
 }
@@ -215,7 +215,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let walks = walks.iter().map(|walk| &walk.1);
     let attempts = Attempts::new(&notes, walks, &names(&permitted));
     let shown = known.iter().map(|(known, limits)| points(known, limits));
-    let profile = profile((rig, began), shown.map(Iterator::collect).collect());
+    let profile = profile(rig, began, shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|wrong| wrong.name.clone());
     let named: Vec<_> = named.collect();
     qualified(&attempts, profile, "frame", &named, whole)

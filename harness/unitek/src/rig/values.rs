@@ -121,8 +121,8 @@ mod tests {
     fn no_two_registers_end_with_the_same_value() {
         let values = values(&Limits::unlimited());
         let last = REGISTERS.iter().filter_map(|register| {
-            let mut own = values.iter().rev();
-            own.find(|value| value.register.number == register.number)
+            let mut rounds = values.iter().rev();
+            rounds.find(|value| value.register.number == register.number)
         });
         let last: Vec<_> = last.map(|value| value.raw).collect();
         let each: BTreeSet<_> = last.iter().collect();

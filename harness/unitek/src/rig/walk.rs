@@ -5,7 +5,7 @@
 
 use super::Axis;
 use super::values::values;
-use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, WalkedPart, walk};
+use harness_bench::qualify::walk::{Walk, WalkBounds, WalkModel, WalkPart, walk};
 use harness_proto::can::{BadFrame, BitRate, Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Request};
@@ -30,10 +30,10 @@ const SPEED: u8 = 0x30;
 
 /// What may be sent to a drive.
 #[derive(Clone, Copy)]
-enum Sent {
+enum DriveInput {
     /// A request of a register (UNITEK 5.2 item 1).
     Read(u8),
-    /// Frames on its identifier, and how many ms pass behind each of them.
+    /// Frames on its identifier, and how many ms pass after each of them.
     Frames(&'static [(&'static [u8], u64)]),
     /// A remote frame (4.4).
     Remote,
@@ -45,10 +45,10 @@ enum Sent {
     Value(u8, Data, Option<&'static str>),
 }
 
-use Sent::{Extended, Frames, Neighbour, Read, Remote, Value};
+use DriveInput::{Extended, Frames, Neighbour, Read, Remote, Value};
 
 /// An input of a walk: its name, what is sent, and the registers that are read after it, beside STATUS.
-type Input = (&'static str, Sent, &'static [u8]);
+type Input = (&'static str, DriveInput, &'static [u8]);
 
 /// The register of the cycle: nothing else asks for it, so that a frame of it is one of the cycle.
 const CYCLIC: u8 = 0x34;
@@ -179,7 +179,7 @@ const FIRST: [&[u8]; 6] = [
     &[0xD4, 0, 0, 0, 0],
 ];
 
-/// Frames behind a walk.
+/// Frames after a walk.
 const LAST: [(&[u8], u64); 4] = [
     (&[0x3D, CYCLIC, 0xFF], 12),
     (&[0x31, 0, 0], 30),
@@ -294,7 +294,7 @@ impl Model {
     }
 }
 
-impl Walked for Model {
+impl WalkModel for Model {
     type State = State;
 
     fn state(&self) -> State {
@@ -369,7 +369,7 @@ pub(super) fn walk_of(axis: Axis, limits: &Limits) -> Walk<State> {
         motion: false,
         ..limits.clone()
     };
-    let both = |limits: &Limits, before: &[WalkedPart<State>]| {
+    let both = |limits: &Limits, before: &[WalkPart<State>]| {
         let states = Model::new(axis, limits);
         let values = Model {
             writes_values: true,
@@ -388,7 +388,7 @@ pub(super) fn walk_of(axis: Axis, limits: &Limits) -> Walk<State> {
 }
 
 /// The walk of a model to what was not walked before.
-fn walk_from(mut model: Model, before: &[WalkedPart<State>]) -> Walk<State> {
+fn walk_from(mut model: Model, before: &[WalkPart<State>]) -> Walk<State> {
     let mut first = Vec::new();
     for bytes in FIRST {
         let mut tried = model.clone();
@@ -399,8 +399,8 @@ fn walk_from(mut model: Model, before: &[WalkedPart<State>]) -> Walk<State> {
     }
     let mut walk = walk(&model, model.inputs.len(), BOUNDS, before);
     for part in &mut walk.parts {
-        let own = std::mem::replace(&mut part.lines, first.clone());
-        part.lines.extend(own);
+        let lines = std::mem::replace(&mut part.lines, first.clone());
+        part.lines.extend(lines);
         // No later value has changed an earlier one.
         let values = part
             .walked
@@ -483,7 +483,7 @@ mod tests {
     fn values_are_written_to_a_locked_drive() {
         let walk = walk_of(AXIS, &Limits::unlimited()).parts.into_iter();
         let writes =
-            |part: &WalkedPart<State>| part.lines.iter().any(|line| line == "> 201 2C FF FF");
+            |part: &WalkPart<State>| part.lines.iter().any(|line| line == "> 201 2C FF FF");
         let parts: Vec<_> = walk.filter(writes).collect();
         assert!(!parts.is_empty());
         for part in parts {

@@ -55,9 +55,9 @@ impl RightDrive for Counter {
     }
 
     fn hear_parted(&self, at: Instant, piece: &u8) -> Option<Self> {
-        let mut own = (*piece == 200).then(|| self.clone())?;
-        own.hear(at, &0);
-        Some(own)
+        let mut drive = (*piece == 200).then(|| self.clone())?;
+        drive.hear(at, &0);
+        Some(drive)
     }
 
     fn is_damaged(came: &u8) -> bool {
@@ -77,8 +77,8 @@ impl RightDrive for Counter {
     }
 
     fn state(&self) -> u64 {
-        let own = self.stops << 10 ^ u64::from(self.number) << 2;
-        own | u64::from(self.runs) << 1 | u64::from(self.wanders)
+        let state = self.stops << 10 ^ u64::from(self.number) << 2;
+        state | u64::from(self.runs) << 1 | u64::from(self.wanders)
     }
 }
 
@@ -107,12 +107,12 @@ fn judged_with(
 
 fn dialogue(sent: &[(u64, u8)], came: &[(u64, u8)], most_lost: usize) -> Dialogue<u8> {
     let timed = |list: &[(u64, u8)], before, behind| -> Vec<_> {
-        let own = |(at, piece): &(u64, u8)| Timed {
+        let piece = |(at, piece): &(u64, u8)| TimedPiece {
             earliest: ms(at - before),
             latest: ms(at + behind),
             piece: *piece,
         };
-        list.iter().map(own).collect()
+        list.iter().map(piece).collect()
     };
     Dialogue {
         sent: timed(sent, 0, 3),
@@ -232,7 +232,7 @@ fn an_answer_is_read_behind_its_question() {
     assert_ne!(one(vec![1]), Judged::Right);
 }
 
-/// What came before nothing more is known is compared, although what was sent behind it may have been on its way.
+/// What came before nothing more is known is compared, although what was sent after it may have been on its way.
 #[test]
 fn what_is_not_known_later_excuses_nothing_before() {
     let sent = [(10, 7), (20, 0), (22, 3), (40, 0)];

@@ -11,7 +11,7 @@ use crate::rig::settle::{Assumptions, search};
 use crate::rig::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
 use harness_bench::link::{Link as _, LinkEvent, Recording};
-use harness_bench::qualify::segment::{Note, Noted};
+use harness_bench::qualify::segment::{AttemptSummary, Note};
 use harness_bench::scenario::run::{Outcome, Why};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nordac::pkw::Index;
@@ -46,7 +46,7 @@ pub(crate) struct SlaveNote {
     shown: AttemptShown,
     /// Where time is real, the telegrams of the bench with what came after each.
     turns: Vec<Turn>,
-    noted: Noted,
+    noted: AttemptSummary,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -348,7 +348,7 @@ impl Note for SlaveNote {
         format!("{name} (NORDAC {section}): {about}")
     }
 
-    fn noted(&self) -> &Noted {
+    fn noted(&self) -> &AttemptSummary {
         &self.noted
     }
 
@@ -419,7 +419,7 @@ impl Player {
                 true => Vec::new(),
                 false => link.noted.turns.clone(),
             },
-            noted: Noted {
+            noted: AttemptSummary {
                 name: scenario.name.clone(),
                 verdict: Verdict::Skipped,
                 accuses: false,

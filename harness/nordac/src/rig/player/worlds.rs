@@ -10,7 +10,7 @@ use crate::rig::known::Known;
 use crate::rig::observed::{Agreement, Turn, WHOLE};
 use crate::rig::settle::{Assumptions, search};
 use crate::simulate::SlaveSetup;
-use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, lost};
+use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, TimedPiece, lost};
 use harness_bench::rig::playing::observed::Beats;
 use harness_proto::nordac::properties::Description;
 use harness_proto::profibus::BusRate;
@@ -124,7 +124,7 @@ struct Talk {
 
 impl Talk {
     fn new(rate: BusRate, turns: &[Turn], most_lost: usize) -> Self {
-        let sent = turns.iter().enumerate().map(|(number, turn)| Timed {
+        let sent = turns.iter().enumerate().map(|(number, turn)| TimedPiece {
             // A stream is not as slow as a line.
             earliest: turn.left - rate.octet_time() * turn.octets.len() as u64,
             latest: read_by(turns, number),
@@ -182,7 +182,7 @@ impl Talk {
         // Where nothing is late, that is seen at once, and to the octet: whole scans do not show each value of a motor.
         let said = self.said(line.clone(), self.left.iter().copied());
         let mut pairs = said.iter().zip(came).zip(&self.turns);
-        let alike = |((said, came), turn): ((&(usize, Piece), &Timed<Piece>), &usize)| {
+        let alike = |((said, came), turn): ((&(usize, Piece), &TimedPiece<Piece>), &usize)| {
             said.0 <= *turn && line.is(&said.1, &came.piece)
         };
         if said.len() == came.len() && pairs.all(alike) {
@@ -239,7 +239,7 @@ fn read_by(turns: &[Turn], number: usize) -> Instant {
 }
 
 /// What came in the scenario, piece by piece, and after which telegram each has begun. What a `lossy` line has left of replies is one piece.
-fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
+fn came(turns: &[Turn], lossy: bool) -> (Vec<TimedPiece<Piece>>, Vec<usize>) {
     let mut octets = Vec::new();
     let mut ends = Vec::new();
     for turn in turns {
@@ -247,7 +247,7 @@ fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
         octets.extend_from_slice(played);
         ends.push(octets.len());
     }
-    let mut all: Vec<Timed<Piece>> = Vec::new();
+    let mut all: Vec<TimedPiece<Piece>> = Vec::new();
     let mut places = Vec::new();
     for range in pieces(&octets, &ends) {
         let place = ends.partition_point(|end| *end <= range.start);
@@ -263,7 +263,7 @@ fn came(turns: &[Turn], lossy: bool) -> (Vec<Timed<Piece>>, Vec<usize>) {
                 last.latest = latest;
             }
             _ => {
-                all.push(Timed {
+                all.push(TimedPiece {
                     earliest: Instant::START,
                     latest,
                     piece,

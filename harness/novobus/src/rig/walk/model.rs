@@ -1,6 +1,6 @@
 //! Right drives of a ring behind the guard, and what a walk sends to one of them.
 
-use harness_bench::qualify::walk::Walked;
+use harness_bench::qualify::walk::WalkModel;
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::nd21::io::OUTPUTS;
 use harness_proto::nd21::ram;
@@ -497,7 +497,7 @@ fn accepted(own: &Parameter, holds: impl Fn(u16) -> u8) -> u8 {
     }
 }
 
-impl Walked for Model {
+impl WalkModel for Model {
     type State = State;
 
     fn state(&self) -> State {

@@ -13,7 +13,7 @@ use crate::gate::guarded;
 use crate::simulate::{self, Bench, DriveSetup};
 use harness_bench::link::{Line as _, Link as _, LinkEvent, Recording};
 use harness_bench::medium::Out;
-use harness_bench::qualify::segment::{Note, Noted};
+use harness_bench::qualify::segment::{AttemptSummary, Note};
 use harness_bench::scenario::run::{Outcome, Why};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::Frame;
@@ -51,7 +51,7 @@ pub(crate) struct DriveNote {
     told: Option<AttemptFrames>,
     /// Whether no right drive could have sent them then.
     wrong: bool,
-    noted: Noted,
+    noted: AttemptSummary,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -279,7 +279,7 @@ impl Note for DriveNote {
         format!("{name} (UNITEK {section}): {about}")
     }
 
-    fn noted(&self) -> &Noted {
+    fn noted(&self) -> &AttemptSummary {
         &self.noted
     }
 
@@ -395,7 +395,7 @@ impl Player {
             drives: drives.collect(),
             told: None,
             wrong: false,
-            noted: Noted {
+            noted: AttemptSummary {
                 name: scenario.name.clone(),
                 verdict: Verdict::Skipped,
                 accuses: false,

@@ -8,7 +8,7 @@ use super::counted::counted;
 use crate::judge::World;
 use crate::language::written;
 use crate::simulate::DriveSetup;
-use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, judge_alive};
+use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, TimedPiece, judge_alive};
 use harness_bench::rig::playing::observed::LinkTimes;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -414,12 +414,12 @@ fn conversation(
     came: &[(Instant, Instant, Frame)],
     late: Span,
 ) -> Dialogue<Frame> {
-    let sent = talk.sent.iter().map(|(at, piece)| Timed {
+    let sent = talk.sent.iter().map(|(at, piece)| TimedPiece {
         earliest: *at - AHEAD.min(late),
         latest: *at + late,
         piece: *piece,
     });
-    let came = came.iter().map(|(at, read, piece)| Timed {
+    let came = came.iter().map(|(at, read, piece)| TimedPiece {
         earliest: *at - late,
         latest: *read,
         piece: *piece,
