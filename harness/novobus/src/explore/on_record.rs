@@ -169,14 +169,14 @@ pub(super) fn is_silenced(last: &AnsweredCase, times: &ByteTimes, found: &Differ
         false => (*start + way, Received::good(!came.byte)),
     });
     let expected: Vec<_> = expected.collect();
-    let sent = twin::Sent {
+    let sent = twin::SentTimes {
         answered: &answered,
         all: &all,
         way,
         earliest: twin::EARLIEST_TIME_OUT,
         complete: false,
     };
-    let excused = sent.excused_from(size, (&expected, &received, index), (true, true));
+    let excused = sent.excused_from(size, &expected, &received, index, true, true);
     excused.is_some_and(|from| received.get(index).is_none_or(|(came, _)| *came >= from))
 }
 

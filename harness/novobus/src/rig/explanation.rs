@@ -20,7 +20,6 @@ const TIME_OUT: &str = "time-out";
 
 /// Choices that explain every byte of an attempt.
 pub(crate) struct Explanation {
-    /// They, in words.
     pub(crate) words: String,
     /// What makes simulated drives behave so.
     pub(crate) header: Header,
@@ -50,11 +49,11 @@ pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
             match compare(&all, facts) {
                 // It moves the model's bytes so that they seem to be late, and explains nothing.
                 Ok(comparisons)
-                    if silence(&comparisons).is_some_and(|own| !own.is_behind(&first))
+                    if silence(&comparisons).is_some_and(|silence| !silence.is_behind(&first))
                         || compared(&comparisons) < first.compared => {}
                 Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
-                    let has_steps = |own: &Conversation| own.has_steps();
+                    let has_steps = |conversation: &Conversation| conversation.has_steps();
                     let last = first.conversation.min(facts.conversations.len());
                     return Some(Explanation {
                         words: chosen.join(" and "),
@@ -91,20 +90,19 @@ struct FirstDifference {
 
 impl FirstDifference {
     fn is_behind(&self, other: &Self) -> bool {
-        let byte = |own: &Self| own.divergence.as_ref().map(|own| own.byte);
-        let place = |own: &Self| (own.conversation, byte(own));
+        let byte = |place: &Self| place.divergence.as_ref().map(|found| found.byte);
+        let place = |place: &Self| (place.conversation, byte(place));
         place(self) > place(other)
     }
 }
 
-/// How many bytes were compared.
 fn compared(comparisons: &[Comparison]) -> u64 {
-    comparisons.iter().map(|own| own.compared).sum()
+    comparisons.iter().map(|result| result.compared).sum()
 }
 
 /// Where a silence of the bench has ended the comparison.
 fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
-    let last = comparisons.last().filter(|own| own.silenced)?;
+    let last = comparisons.last().filter(|result| result.silenced)?;
     Some(FirstDifference {
         conversation: comparisons.len(),
         divergence: last.divergence.clone().map(Box::new),
@@ -112,7 +110,7 @@ fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
     })
 }
 
-/// What is tried behind `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
+/// What is tried after `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
 fn candidates<'c>(
     open: &'c [Choice],
     first: &FirstDifference,
@@ -136,9 +134,9 @@ fn candidates<'c>(
         }
         for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
             let single = (0..size.drives()).map(|drive| {
-                let own = choice.in_some(DriveRange::one(ring, drive));
+                let setup = choice.in_some(DriveRange::one(ring, drive));
                 let words = format!(" in drive {}{drive}", ring_prefix(ring));
-                (choice, words, own.into_iter().collect())
+                (choice, words, setup.into_iter().collect())
             });
             all.extend(single);
         }
@@ -148,10 +146,10 @@ fn candidates<'c>(
 
 /// The choices that the rig's file and its profile do not settle.
 fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
-    let profile = facts.rig.profile.iter().flat_map(|own| &own.lines);
+    let profile = facts.rig.profile.iter().flat_map(|profile| &profile.lines);
     let sim = facts.rig.file.sim.iter().flat_map(|sim| &sim.setup);
     let settings = sim::read(profile.chain(sim)).setups;
-    let is_settled = |property| settings.iter().any(|own| own.sets() == Some(property));
+    let is_settled = |property| settings.iter().any(|setup| setup.sets() == Some(property));
     let settled = |choice: &Choice| {
         is_settled(choice.property) || choice.with.is_some() && is_settled(SELF_TEST_TIME)
     };
@@ -166,19 +164,20 @@ fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
 /// A pause of received bytes that is longer than any between two bytes of drives that answer.
 const PAUSE: Span = Span::from_millis(50);
 
-/// How long drives may have been silent behind their reset (ND21 10.5, 11.8), where the bench has sent bytes to which none came back: the
+/// How long drives may have been silent after their reset (ND21 10.5, 11.8), where the bench has sent bytes to which none came back: the
 /// middle between the longest time for which they certainly were and the shortest for which they can have been.
 fn silent_for(conversations: &[Conversation]) -> Option<Duration> {
     let (mut least, mut most) = (Span::ZERO, None::<Span>);
-    for own in conversations {
-        for pair in own.received.windows(2) {
+    for conversation in conversations {
+        for pair in conversation.received.windows(2) {
             let [(ring, last, _), (next_ring, next, _)] = pair else {
                 continue;
             };
             if ring != next_ring || next.since(*last) < PAUSE {
                 continue;
             }
-            let unanswered = own.done.iter().filter_map(|(to, done)| match done {
+            let done = conversation.done.iter();
+            let unanswered = done.filter_map(|(to, done)| match done {
                 Done::Sent(at, _) if to == ring && at > last && *at + PAUSE < *next => Some(*at),
                 _ => None,
             });
@@ -218,9 +217,10 @@ fn compare(
     };
     let comparisons = twin.follow_while_alike(facts.conversations, facts.exactness);
     let conversation = comparisons.len();
-    // What differs behind a silence of the bench says nothing about a choice.
-    let last = comparisons.last().filter(|own| !own.silenced);
-    match last.and_then(|own| own.divergence.clone()).map(Box::new) {
+    // What differs after a silence of the bench says nothing about a choice.
+    let last = comparisons.last().filter(|result| !result.silenced);
+    let divergence = last.and_then(|result| result.divergence.clone());
+    match divergence.map(Box::new) {
         None => Ok(comparisons),
         divergence => Err((
             FirstDifference {

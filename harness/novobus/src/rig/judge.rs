@@ -5,7 +5,9 @@ use super::sim;
 use crate::language::plan::Plan;
 use crate::language::syntax::{DriveRange, Header, Setup};
 use crate::rig::run::{Way, play_one, twin};
-use crate::twin::{Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, Unasked};
+use crate::twin::{
+    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, UnaskedByte,
+};
 use harness_bench::link::{LinkEvent, Recording};
 use harness_bench::rig::check::Rig;
 use harness_bench::rig::file::Deviation;
@@ -21,9 +23,7 @@ const MOST_ADOPTED: usize = 8;
 /// What is known of an attempt besides its outcome.
 pub(crate) struct AttemptFacts<'h> {
     pub rig: &'h Rig,
-    /// The scenario.
     pub plan: &'h Plan,
-    /// How it was played.
     pub way: &'h Way,
     /// How exactly the twin was compared.
     pub exactness: Exactness,
@@ -74,7 +74,7 @@ pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<E
         _ => {}
     }
     // Where its steps send something, each byte that comes back was compared with the twin's.
-    let sends = |own: &Conversation| own.has_steps() && own.sends();
+    let sends = |conversation: &Conversation| conversation.has_steps() && conversation.sends();
     if !facts.plan.judges() && !facts.conversations.iter().any(sends) {
         outcome.judged_nothing();
     }
@@ -112,6 +112,7 @@ fn diverged(
     let rule = format!("nd21 {}", divergence.rule.0);
     let mut known = facts.rig.file.deviation.iter();
     let may_be = divergence.drive.or(divergence.role.drive());
+    let silenced = |all: &[Comparison]| all.iter().any(|result| result.silenced);
     match known.find(|entry| by_hand(entry) && entry.explains(&rule, divergence.ring, may_be)) {
         Some(entry) => {
             if outcome.verdict != Verdict::Inconclusive {
@@ -120,7 +121,7 @@ fn diverged(
             outcome.remarks.push(told(entry));
         }
         None => match explanation::of(facts) {
-            Some(found) if found.comparisons.iter().any(|own| own.silenced) => {
+            Some(found) if silenced(&found.comparisons) => {
                 late(outcome);
                 outcome.remarks.push(format!(
                     "{} explains every byte up to a silence of the bench: {SILENCED}",
@@ -140,7 +141,7 @@ fn diverged(
                     found.words
                 ));
             }
-            None if facts.comparisons.iter().any(|own| own.silenced) => {
+            None if silenced(facts.comparisons) => {
                 late(outcome);
                 outcome.remarks.push(SILENCED.to_owned());
             }
@@ -180,17 +181,17 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
         outcome.verdict = Verdict::Passed;
         let known = facts.rig.file.deviation.iter();
         outcome.remarks.extend(known.map(told));
-    } else if let Some(own) = of_the_drive(finding, facts)
+    } else if let Some(byte) = of_the_drive(finding, facts)
         && !facts.exactness.knows_cells
     {
         outcome.verdict = Verdict::Inconclusive;
-        let what = match own.address {
+        let what = match byte.address {
             Some(address) => format!("cell {address:04X}"),
             None => "an answer".to_owned(),
         };
         outcome.remarks.push(format!(
             "{what} of drive {} depends on the drive's own state, which the scenario does not set; set it in the header, or write it first",
-            own.drive
+            byte.drive
         ));
     } else if in_a_race(finding, facts) {
         outcome.verdict = Verdict::Inconclusive;
@@ -233,7 +234,8 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
 
 /// Whether drives monitor time-outs, and the line may have been silent for longer than the computer has measured (ND21 9.9).
 fn may_be_late(facts: &AttemptFacts<'_>) -> bool {
-    facts.exactness.tolerance > Span::ZERO && facts.comparisons.iter().any(|own| own.monitored)
+    facts.exactness.tolerance > Span::ZERO
+        && facts.comparisons.iter().any(|result| result.monitored)
 }
 
 /// The computer was late, which accuses no drive and speaks for none.
@@ -258,11 +260,11 @@ fn passes(rig: &Rig, facts: &AttemptFacts<'_>) -> bool {
 /// Whether the rig's file or its profile settles properties that the manual leaves open, and the scenario passes without them but not with
 /// them, on drives that have just been switched on: what was played before explains nothing here.
 fn passes_with_defaults(facts: &AttemptFacts<'_>) -> bool {
-    let settles = |own: &Setup| own.sets().is_some();
+    let settles = |setup: &Setup| setup.sets().is_some();
     let mut rig = facts.rig.clone();
-    let own = sim::setup(&rig);
-    let settled = rig.profile.take().is_some() | own.setups.iter().any(settles);
-    sim::set_up(&mut rig, &own.only(|own| !settles(own)));
+    let header = sim::setup(&rig);
+    let settled = rig.profile.take().is_some() | header.setups.iter().any(settles);
+    sim::set_up(&mut rig, &header.only(|setup| !settles(setup)));
     settled && !passes(facts.rig, facts) && passes(&rig, facts)
 }
 
@@ -279,14 +281,14 @@ fn explained_by_known(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
         && switched_on(facts.rig, &deviations, facts).is_some_and(fails_alike)
 }
 
-/// Whether a finding may be about bytes of the scenario's own conversation, behind the first one of that ring that a drive sent unasked.
+/// Whether a finding may be about bytes of the scenario's own conversation, after the first one of that ring that a drive sent unasked.
 fn in_a_race(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
     let compared = facts.conversations.iter().zip(facts.comparisons);
     let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
     let compared = of_scenario.clone().next();
     if compared.is_none_or(|(_, comparison)| comparison.left_out) {
         // A race before the scenario: its ring has not been compared since.
-        let mut before = facts.comparisons.iter().flat_map(|own| &own.unasked);
+        let mut before = facts.comparisons.iter().flat_map(|result| &result.unasked);
         let ring = finding.difference.as_ref().map(|found| found.ring);
         return before.any(|race| ring.is_none_or(|ring| race.ring == ring));
     }
@@ -294,7 +296,7 @@ fn in_a_race(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
     match &finding.difference {
         Some(found) => {
             let within =
-                |race: &Unasked, at| at >= race.at && race.until.is_none_or(|end| at < end);
+                |race: &UnaskedByte, at| at >= race.at && race.until.is_none_or(|end| at < end);
             races.any(|race| race.ring == found.ring && found.at.is_none_or(|at| within(race, at)))
         }
         None => races.next().is_some(),
@@ -304,35 +306,36 @@ fn in_a_race(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
 /// that the line of the finding asked for. The cells of the scenario's header are not the drive's own.
 fn of_the_drive<'h>(finding: &Mismatch, facts: &AttemptFacts<'h>) -> Option<&'h OwnByte> {
-    let set = |own: &OwnByte| {
+    let set = |answer: &OwnByte| {
         let mut setups = facts.plan.memory_setups();
         setups.any(|(ring, drives, from, bytes)| {
-            let offset = own.address.and_then(|address| address.checked_sub(from));
+            let offset = answer.address.and_then(|address| address.checked_sub(from));
             let within = offset.is_some_and(|offset| usize::from(offset) < bytes.len());
-            ring == own.ring && drives.contains(&own.drive) && within
+            ring == answer.ring && drives.contains(&answer.drive) && within
         })
     };
-    let about = |conversation: &Conversation, own: &OwnByte| match &finding.difference {
+    let about = |conversation: &Conversation, answer: &OwnByte| match &finding.difference {
         Some(difference) => {
             let asked_for = difference.index < difference.expected.len();
             let differs = match difference.expected.get(difference.index) {
-                Some(Expected::Byte(byte)) => byte ^ own.value,
+                Some(Expected::Byte(byte)) => byte ^ answer.value,
                 _ => 0,
             };
             asked_for
-                && differs & own.known == 0
-                && difference.ring == own.ring
-                && difference.at == Some(own.at)
+                && differs & answer.known == 0
+                && difference.ring == answer.ring
+                && difference.at == Some(answer.at)
         }
-        None => conversation.step_at(own.ring, own.place) == Some(finding.span.start),
+        None => conversation.step_at(answer.ring, answer.place) == Some(finding.span.start),
     };
     let compared = facts.conversations.iter().zip(facts.comparisons);
     let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
     let mut all = of_scenario.flat_map(|(conversation, comparison)| {
-        comparison.own.iter().map(move |own| (conversation, own))
+        let answers = comparison.own.iter();
+        answers.map(move |answer| (conversation, answer))
     });
-    let found = all.find(|(conversation, own)| about(conversation, own) && !set(own));
-    found.map(|(_, own)| own)
+    let found = all.find(|(conversation, answer)| about(conversation, answer) && !set(answer));
+    found.map(|(_, answer)| answer)
 }
 
 /// The known deviations of a rig that the simulator has.

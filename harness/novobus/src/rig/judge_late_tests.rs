@@ -15,7 +15,7 @@ use std::cell::Cell;
 use std::collections::VecDeque;
 
 /// A port whose bytes come late from the tenth on: the link gives them up before, as one behind a computer that stands still.
-struct Late {
+struct LatePort {
     link: SimulatedLink,
     late: Span,
     /// Whether the bench looks for them.
@@ -26,7 +26,7 @@ struct Late {
     free: Instant,
 }
 
-impl Late {
+impl LatePort {
     /// How long the link waits for a byte.
     const GIVES_UP: Span = Span::from_millis(40);
 
@@ -43,7 +43,7 @@ impl Late {
     }
 }
 
-impl Line for Late {
+impl Line for LatePort {
     fn medium(&self, port: usize) -> Medium {
         self.link.medium(port)
     }
@@ -82,7 +82,7 @@ impl Line for Late {
     }
 }
 
-impl Link for Late {
+impl Link for LatePort {
     fn capabilities(&self) -> &[Capability] {
         self.link.capabilities()
     }
@@ -142,7 +142,7 @@ fn late_bytes_fail_no_drive() {
             attempts: None,
             anew: false,
         };
-        let mut link = Late {
+        let mut link = LatePort {
             link: link(""),
             late: Span::from_millis(late),
             looks,
@@ -223,7 +223,7 @@ fn zeros_of_the_bench_excuse_no_wrong_byte() {
     judged("drive 2 deviates process-data-high-byte-early\n", Failed);
 }
 
-/// ND21 9.8, 9.9, 14.10.2, 14.11.14: all drives that monitor have missed a master that was silent for 20 ms, and behind the check sequence
+/// ND21 9.8, 9.9, 14.10.2, 14.11.14: all drives that monitor have missed a master that was silent for 20 ms, and after the check sequence
 /// that ends the race of their clocks what they hold is compared again.
 #[test]
 fn the_code_of_a_time_out_is_judged() {
@@ -243,9 +243,10 @@ fn the_code_of_a_time_out_is_judged() {
         let (meant, byte_time) = (Cell::new(None), link("").byte_time());
         let outcome = judged_with(ring, "", &scenario, &|conversations, comparisons| {
             let mut all = comparisons.iter().enumerate();
-            let found = all.find(|(_, own)| own.divergence.is_some());
-            let sighting = found.and_then(|own| Sighting::of(conversations, own, 3, byte_time));
-            meant.set(sighting.map(|own| own.meant));
+            let found = all.find(|(_, result)| result.divergence.is_some());
+            let sighting =
+                found.and_then(|result| Sighting::of(conversations, result, 3, byte_time));
+            meant.set(sighting.map(|sighting| sighting.meant));
         });
         (outcome.verdict, meant.get())
     };
@@ -284,7 +285,7 @@ fn process_data_that_a_time_out_cuts_are_judged() {
     );
 }
 
-/// ND21 9.9, 14.10.2: a drive that alone monitors has detected a time-out "no later than 20 ms" behind the last byte, whichever drives are behind it.
+/// ND21 9.9, 14.10.2: a drive that alone monitors has detected a time-out "no later than 20 ms" after the last byte, whichever drives are behind it.
 #[test]
 fn a_time_out_that_does_not_come_is_the_drives_fault() {
     let verdict = |ring: &str, silence: &str| {

@@ -102,7 +102,7 @@ fn right_drives(share: usize) -> (usize, BTreeSet<&'static str>) {
             anew: true,
         };
         let all = RIGHT.iter().enumerate();
-        for (number, drives) in all.filter(|(own, _)| (place + own).is_multiple_of(share)) {
+        for (number, drives) in all.filter(|(number, _)| (place + number).is_multiple_of(share)) {
             let lines = drives.lines().map(|line| format!("drive 0..last {line}\n"));
             let mut link = link_of(size.drives(), &lines.collect::<String>());
             let mut events: Vec<LinkEvent> = Vec::new();
@@ -114,9 +114,9 @@ fn right_drives(share: usize) -> (usize, BTreeSet<&'static str>) {
             let outcome = judged_on(&mut link, "", (&plan, &way), &|_, _| {});
             let row = OPEN
                 .iter()
-                .find(|(own, _)| name.ends_with(&format!("/{own}.scn")));
+                .find(|(file, _)| name.ends_with(&format!("/{file}.scn")));
             let is_open = row.is_some() && outcome.verdict == Inconclusive;
-            open.extend(row.filter(|_| is_open).map(|(own, _)| *own));
+            open.extend(row.filter(|_| is_open).map(|(file, _)| *file));
             let right = outcome.verdict == Passed || is_open;
             if !right {
                 let message = outcome.finding.map(|found| found.message);

@@ -12,14 +12,14 @@ use crate::rig::run::Way;
 use crate::rig::run::play_one;
 use crate::rig::run::twin;
 use crate::simulate::bench;
-use crate::twin::{Comparison, Conversation, Exactness, Unasked};
+use crate::twin::{Comparison, Conversation, Exactness, UnaskedByte};
 use harness_bench::link::{Link, LinkEvent, Octets, Recording};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
 use harness_proto::time::{Instant, Span};
 
-/// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
+/// The verdict of a scenario on a ring of three with these header lines, on a rig whose file ends with this text.
 pub(super) fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
     judged_with(ring, rig, scenario, &|_, _| {})
 }
@@ -98,7 +98,8 @@ pub(super) fn judged_early(
     };
     let all = Conversation::all(&events, byte_time, true);
     let (mut conversations, _) = way.compared(all, exactness);
-    for (_, at, _) in conversations.iter_mut().flat_map(|own| &mut own.received) {
+    let received = conversations.iter_mut().flat_map(|talk| &mut talk.received);
+    for (_, at, _) in received {
         *at = *at - early;
     }
     let mut twin = twin(&rig, &known(&rig)).expect("a twin");
@@ -178,11 +179,11 @@ fn a_known_deviation_excuses_nothing_else() {
     };
     let ignores = "drive 1 deviates writes-ignored";
     let writes = "write-byte 1 FE13 = 77\nread-byte 1 FE13 = 77\n";
-    let own = known("writes-ignored", 1, "10.2");
-    check(ignores, &own, writes, Passed);
+    let deviation = known("writes-ignored", 1, "10.2");
+    check(ignores, &deviation, writes, Passed);
     check(ignores, "", writes, Failed);
-    check(ignores, &own, &format!("{READ}< 88 02\n"), Failed);
-    check("", &own, &format!("{READ}< 88 02\n"), Failed);
+    check(ignores, &deviation, &format!("{READ}< 88 02\n"), Failed);
+    check("", &deviation, &format!("{READ}< 88 02\n"), Failed);
     // One that the simulator does not have, of another drive, and of another section.
     let (wrong, reads) = ("drive 1 deviates checksum-wrong", "read-byte 1 FE13\n");
     check(wrong, &known("odd-sums", 1, "9.6"), reads, Passed);
@@ -250,7 +251,7 @@ fn cells_that_process_data_have_written_are_known() {
 #[test]
 fn a_race_excuses_nothing_elsewhere() {
     let scenario = format!("{SET}{READ}< 88 01 C0 13 77 xx\n");
-    let ended = |ring: usize, until: Option<Instant>| Unasked {
+    let ended = |ring: usize, until: Option<Instant>| UnaskedByte {
         ring,
         at: Instant::START,
         until,
@@ -261,14 +262,15 @@ fn a_race_excuses_nothing_elsewhere() {
     assert_eq!(verdict(&|_, all| all[0].unasked.push(race(0))), Failed);
     let of_all = |ring: usize| {
         move |_: &[Conversation], all: &mut [Comparison]| {
-            all.iter_mut().for_each(|own| own.unasked.push(race(ring)))
+            let end = |result: &mut Comparison| result.unasked.push(race(ring));
+            all.iter_mut().for_each(end);
         }
     };
     assert_eq!(verdict(&of_all(1)), Failed);
     assert_eq!(verdict(&of_all(0)), Inconclusive);
-    // The bytes behind a check sequence that ended it are compared again.
+    // The bytes after a check sequence that ended it are compared again.
     let over = |_: &[Conversation], all: &mut [Comparison]| {
-        let end = |own: &mut Comparison| own.unasked.push(ended(0, Some(Instant::START)));
+        let end = |result: &mut Comparison| result.unasked.push(ended(0, Some(Instant::START)));
         all.iter_mut().for_each(end);
     };
     assert_eq!(verdict(&over), Failed);
@@ -425,7 +427,7 @@ fn masks_on_cells_that_were_not_set_accuse_no_drive() {
     check(wrong, "", scenario, Failed);
 }
 
-/// ND21 14.10.3: `DataIn` is known behind every command that writes it.
+/// ND21 14.10.3: `DataIn` is known after every command that writes it.
 #[test]
 fn every_command_that_sets_data_in_is_followed() {
     let swapped = "drive 1 deviates process-data-in-swapped";
@@ -462,7 +464,7 @@ fn a_refused_read_says_nothing_of_a_cell() {
     assert_eq!(judged(&wrong, &again), Failed);
 }
 
-/// ND21 11.8: drives that are silent while they test themselves lose bytes. A value read behind that is still known to be the drive's.
+/// ND21 11.8: drives that are silent while they test themselves lose bytes. A value read after that is still known to be the drive's.
 #[test]
 fn silent_self_tests_accuse_no_drive() {
     let mut ring = link(
@@ -481,7 +483,7 @@ fn silent_self_tests_accuse_no_drive() {
     assert!(remarks.contains("self-test-bus = silent"), "{remarks}");
 }
 
-/// The verdict of a scenario on a simulated rig of three with these lines in its `[sim] setup`, behind these lines played before.
+/// The verdict of a scenario on a simulated rig of three with these lines in its `[sim] setup`, after these lines played before.
 fn judged_simulated(setup: &[&str], before: &str, scenario: &str) -> Outcome {
     let text = format!(
         "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = {setup:?}\n"

@@ -1,11 +1,13 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
-use super::comparison::{Adopted, Comparison, Divergence, Exactness, OwnByte, Symptom, Unasked};
+use super::comparison::{
+    AdoptedCell, Comparison, Divergence, Exactness, OwnByte, Symptom, UnaskedByte,
+};
 use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::places::{answered, collapsed, heard, known_places, what_of};
 use super::rows::{Rows, answer_of};
-use super::unasked::{Sent, behind_a_race};
+use super::unasked::{SentTimes, behind_a_race};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
 use harness_proto::nd21::{own, ram};
@@ -22,9 +24,7 @@ const TIME_OUT_RANGE: Span = Span::from_millis(10);
 /// What is compared, ring by ring.
 pub(crate) struct Comparer<'a> {
     pub(crate) exactness: Exactness,
-    /// How long a byte takes on the line.
     pub(crate) byte_time: Span,
-    /// What is known of the drives' cells.
     pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
     pub(crate) recording: BTreeSet<(usize, u8)>,
@@ -44,14 +44,15 @@ impl Comparer<'_> {
         conversation: &Conversation,
         answer: &TwinBytes,
     ) {
-        self.ring_from(0, (ring, size), conversation, answer);
+        self.ring_from(0, ring, size, conversation, answer);
     }
 
     /// The same of the last part of a conversation; `before` is the number of bytes received in front of it.
     fn ring_from(
         &mut self,
         before: usize,
-        (ring, size): (usize, RingSize),
+        ring: usize,
+        size: RingSize,
         conversation: &Conversation,
         answer: &TwinBytes,
     ) {
@@ -68,20 +69,20 @@ impl Comparer<'_> {
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
         let known = match aligned {
             true => roles.len(),
-            false => known_places(&sent, (&places, &roles), expected, received),
+            false => known_places(&sent, &places, &roles, expected, received),
         };
         let real_time = self.exactness.tolerance > Span::ZERO;
         let answered_at: Vec<_> = places.iter().map(|place| starts[*place]).collect();
-        let times = Sent {
+        let times = SentTimes {
             answered: &answered_at,
             all: &starts,
             way,
             earliest: self.earliest_time_out,
             complete: expected.len() >= asked_for,
         };
-        let monitors = self.monitoring(ring, size).any(|own| own == Some(true));
-        let judged_with = (self.exactness.tolerance, monitors);
-        let race = || times.judge(size, (answer, received), judged_with);
+        let monitors = self.monitoring(ring, size).any(|does| does == Some(true));
+        let tolerance = self.exactness.tolerance;
+        let race = || times.judge(size, answer, received, tolerance, monitors);
         let unasked = real_time.then(race).flatten();
         let may = self.comparison.monitored || self.knowledge.may_monitor(ring, size);
         let monitored = self.comparison.monitored;
@@ -94,10 +95,10 @@ impl Comparer<'_> {
         // The bytes before a place that differs are right.
         let excused = |index: usize| {
             let right = if in_place { index } else { 0 };
-            times.excused_from(size, (whole.0, whole.1, right), (may, monitored))
+            times.excused_from(size, whole.0, whole.1, right, may, monitored)
         };
         let (shorter, short);
-        // A race of clocks is compared up to its first byte, and the long runs behind it do not matter.
+        // A race of clocks is compared up to its first byte, and the long runs after it do not matter.
         let (expected, received) = if in_place {
             whole
         } else {
@@ -132,11 +133,12 @@ impl Comparer<'_> {
             let mut index = index;
             if let Some(race) = race {
                 let at = received.get(index).or(expected.get(index));
-                self.comparison.unasked.extend(at.map(|(at, _)| Unasked {
+                let first = at.map(|(at, _)| UnaskedByte {
                     ring,
                     at: *at,
                     until: None,
-                }));
+                });
+                self.comparison.unasked.extend(first);
                 if let (None, Some((place, fault))) = (&what, &race.fault) {
                     (index, what) = (*place, Some(*fault));
                 }
@@ -145,7 +147,7 @@ impl Comparer<'_> {
                 if race.is_none() {
                     continue;
                 }
-                self.behind_a_race(before, (ring, size), conversation, answer);
+                self.behind_a_race(before, ring, size, conversation, answer);
                 return;
             };
             let role = rows.role(index);
@@ -162,7 +164,7 @@ impl Comparer<'_> {
                     .held((ring, drive, address))
                     .unwrap_or(due.byte);
             }
-            // It looks at the bytes behind this one, with what is known then.
+            // It looks at the bytes after this one, with what is known then.
             let drive = match size.drives() {
                 1 => Some(0),
                 _ => aligned.then(|| self.culprit(&rows, index)).flatten(),
@@ -205,25 +207,27 @@ impl Comparer<'_> {
         (0..size.drives()).map(move |drive| self.knowledge.monitors(ring, drive))
     }
 
-    /// Compares what comes behind a check sequence that ends a race of clocks, if one does.
+    /// Compares what comes after a check sequence that ends a race of clocks, if one does.
     fn behind_a_race(
         &mut self,
         before: usize,
-        (ring, size): (usize, RingSize),
+        ring: usize,
+        size: RingSize,
         conversation: &Conversation,
         answer: &TwinBytes,
     ) {
-        if self.monitoring(ring, size).any(|own| own.is_none()) {
+        if self.monitoring(ring, size).any(|does| does.is_none()) {
             return;
         }
-        let monitor = self.monitoring(ring, size).filter(|own| *own == Some(true));
-        let silence = (self.exactness.tolerance, monitor.count() == 1);
-        let rest = behind_a_race(conversation, (ring, size), answer, silence);
+        let does = |monitors: &Option<bool>| *monitors == Some(true);
+        let alone = self.monitoring(ring, size).filter(does).count() == 1;
+        let tolerance = self.exactness.tolerance;
+        let rest = behind_a_race(conversation, ring, size, answer, tolerance, alone);
         if let Some((conversation, answer, left)) = rest {
             if let Some(race) = self.comparison.unasked.last_mut() {
                 race.until = conversation.received.first().map(|(_, at, _)| *at);
             }
-            self.ring_from(before + left, (ring, size), &conversation, &answer);
+            self.ring_from(before + left, ring, size, &conversation, &answer);
         }
     }
 
@@ -244,8 +248,8 @@ impl Comparer<'_> {
             .filter(|index| self.row(rows, *index, || None).is_some())
             .collect();
         self.comparison = before;
-        let own = |index: &usize| answering(*index) == Some(drive);
-        let several = !differing.is_empty() && differing.iter().all(own);
+        let answers = |index: &usize| answering(*index) == Some(drive);
+        let several = !differing.is_empty() && differing.iter().all(answers);
         let sums_up = || differing.is_empty() && rows.is_summed_up(first, drive);
         (several || sums_up()).then_some(drive)
     }
@@ -273,7 +277,7 @@ impl Comparer<'_> {
         let found_good = found.error.is_none() || !self.exactness.line_errors;
         let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
         let right = match index < rows.known {
-            true => self.is_right(rows, (wanted.byte, found.byte), index),
+            true => self.is_right(rows, wanted.byte, found.byte, index),
             false => None,
         };
         let equal = wanted.byte == found.byte;
@@ -287,7 +291,7 @@ impl Comparer<'_> {
         match (same, wanted_good == found_good) {
             (true, true) => {
                 let index = rows.before + index;
-                self.time((ring, index), role, step, ((due, wanted), (at, found)));
+                self.time(ring, index, role, step, (due, wanted), (at, found));
                 None
             }
             (true, false) => Some(Symptom::LineStatus),
@@ -299,18 +303,13 @@ impl Comparer<'_> {
 
     /// Whether a byte is right that need not be the model's: data that the model cannot know, or their checking byte. `None` for a byte
     /// that must be the model's.
-    fn is_right(
-        &mut self,
-        rows: &Rows<'_>,
-        (wanted, value): (u8, u8),
-        index: usize,
-    ) -> Option<bool> {
+    fn is_right(&mut self, rows: &Rows<'_>, wanted: u8, value: u8, index: usize) -> Option<bool> {
         let Rows { ring, roles, .. } = *rows;
         match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
-            } => self.data_are_right((ring, drive, address), (wanted, value)),
+            } => self.data_are_right((ring, drive, address), wanted, value),
             Role::ProcessData { drive: Some(drive) } if !self.exactness.knows_cells => {
                 let pointer = self.knowledge.target(ring, drive, ram::DATA_OUT);
                 let Some(target) = pointer else {
@@ -319,7 +318,7 @@ impl Comparer<'_> {
                 };
                 let second = u16::from(rows.is_second_of_process_data(index));
                 let place = (ring, drive, target.wrapping_add(second));
-                self.data_are_right(place, (wanted, value))
+                self.data_are_right(place, wanted, value)
             }
             Role::Check {
                 drive: Some(drive),
@@ -332,12 +331,12 @@ impl Comparer<'_> {
                     |place: usize| rows.expected[place].1.byte != rows.received[place].1.byte;
                 let bytes = answer().map(|place| rows.received[place].1.byte);
                 let sum = bytes.fold(Checksum::EMPTY, Checksum::with);
-                let own = answer().any(other).then(|| sum.minus() == value);
+                let right = answer().any(other).then(|| sum.minus() == value);
                 // No checking byte is 00 (9.6).
-                if value != 0 && own.unwrap_or(wanted == value) {
+                if value != 0 && right.unwrap_or(wanted == value) {
                     self.learn_zeros(ring, drive, answer_of(&roles[..index], drive, length));
                 }
-                own
+                right
             }
             _ => None,
         }
@@ -358,7 +357,7 @@ impl Comparer<'_> {
     }
 
     /// Whether a cell may hold a value, where the model's holds `wanted`; `None` where it must be the model's.
-    fn data_are_right(&mut self, place: CellByte, (wanted, value): (u8, u8)) -> Option<bool> {
+    fn data_are_right(&mut self, place: CellByte, wanted: u8, value: u8) -> Option<bool> {
         let (ring, drive, address) = place;
         if let Some((asked, looks)) = self.exactness.looks
             && let Some(look) = looks.iter().find(|look| look.address == address)
@@ -378,7 +377,7 @@ impl Comparer<'_> {
                 self.comparison.against += u64::from(value != wanted && written == 0xFF);
             }
             ByteRead::Learned if value == wanted => {}
-            ByteRead::Learned => self.comparison.adopted.push(Adopted {
+            ByteRead::Learned => self.comparison.adopted.push(AdoptedCell {
                 ring,
                 drive,
                 address,
@@ -429,14 +428,14 @@ impl Comparer<'_> {
                 ..
             } => {
                 let mut answer = answer_of(&rows.roles[..index], drive, length);
-                let own = answer.find_map(|(place, role)| match role {
+                let data = answer.find_map(|(place, role)| match role {
                     Role::Data { address, .. } => {
                         let value = rows.received.get(place)?.1.byte;
                         (known(drive, *address, value) != 0xFF).then_some(*address)
                     }
                     _ => None,
                 });
-                match own {
+                match data {
                     Some(address) => (drive, Some(address), 0),
                     None => return,
                 }
@@ -491,13 +490,15 @@ impl Comparer<'_> {
     /// Notes how far two times are apart; never ends the comparison.
     fn time(
         &mut self,
-        (ring, index): (usize, usize),
+        ring: usize,
+        index: usize,
         role: Role,
         step: impl FnOnce() -> Option<usize>,
-        (expected, received): ((Instant, Received), (Instant, Received)),
+        expected: (Instant, Received),
+        received: (Instant, Received),
     ) {
         let unwatched = self.unwatched.iter().copied();
-        let came = |own: &(Instant, Instant)| (own.0..=own.1).contains(&received.0);
+        let came = |span: &(Instant, Instant)| (span.0..=span.1).contains(&received.0);
         let read = (received.0, received.0);
         let (earliest, latest) = unwatched.rev().find(came).unwrap_or(read);
         let apart = |(earliest, latest): (Instant, Instant)| {

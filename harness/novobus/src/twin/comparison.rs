@@ -23,9 +23,7 @@ pub(crate) struct Exactness {
 /// Bits of a cell that decide a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DecidingBits {
-    /// The address of the byte.
     pub address: u16,
-    /// The bits.
     pub mask: u8,
 }
 
@@ -63,7 +61,6 @@ pub(crate) enum Symptom {
 }
 
 impl Symptom {
-    /// A short description.
     #[must_use]
     pub(crate) const fn words(self) -> &'static str {
         match self {
@@ -87,13 +84,10 @@ pub(crate) struct Divergence {
     pub ring: usize,
     /// Which byte received in this conversation, counted from 1.
     pub byte: usize,
-    /// How it differs.
     pub what: Symptom,
     /// The byte that the model expects, and its time.
     pub expected: Option<(Instant, Received)>,
-    /// The byte received, and its time.
     pub received: Option<(Instant, Received)>,
-    /// What the byte is for.
     pub role: Role,
     /// The section of the ND21 manual with the rule that is broken, and the rule in a few words.
     pub rule: (&'static str, &'static str),
@@ -152,13 +146,11 @@ impl fmt::Display for Divergence {
 
 /// A cell whose content the model did not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Adopted {
+pub(crate) struct AdoptedCell {
     /// In which ring, counted from 0.
     pub ring: usize,
     pub drive: u8,
-    /// Which cell.
     pub address: u16,
-    /// What it holds.
     pub value: u8,
 }
 
@@ -177,32 +169,31 @@ pub(crate) struct OwnByte {
     pub address: Option<u16>,
     /// The bits that are not the drive's choice, because the master has written them.
     pub known: u8,
-    /// The byte.
     pub value: u8,
 }
 
 /// The first byte in a conversation that a drive sent unasked (ND21 9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Unasked {
+pub(crate) struct UnaskedByte {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// When it was received, or was due.
     pub at: Instant,
-    /// When the first byte came behind a check sequence with which the bytes are compared again.
+    /// When the first byte came after a check sequence with which the bytes are compared again.
     pub until: Option<Instant>,
 }
 
 impl Comparison {
-    /// The rings of which no model knows the state behind the conversation.
+    /// The rings of which no model knows the state after the conversation.
     pub(crate) fn open_races(&self) -> impl Iterator<Item = usize> + '_ {
         let open = self.unasked.iter().filter(|race| race.until.is_none());
         open.map(|race| race.ring)
     }
 
-    /// Whether a difference comes behind a check sequence that ends such a race.
+    /// Whether a difference comes after a check sequence that ends such a race.
     pub(crate) fn is_behind_a_race(&self, found: &Divergence) -> bool {
         let at = found.received.map(|(at, _)| at);
-        let ended = |race: &&Unasked| race.ring == found.ring && race.until.is_some();
+        let ended = |race: &&UnaskedByte| race.ring == found.ring && race.until.is_some();
         self.unasked
             .iter()
             .filter(ended)
@@ -220,7 +211,7 @@ pub(crate) struct Comparison {
     /// How many hold what the master wrote, although the model is a wrong drive's and holds something else.
     pub against: u64,
     /// The contents of cells that the model took over.
-    pub adopted: Vec<Adopted>,
+    pub adopted: Vec<AdoptedCell>,
     /// The bytes whose values are the drives' choice, in order; empty if the twin knows the content of every cell.
     pub own: Vec<OwnByte>,
     /// The first byte that differs in more than its time.
@@ -230,9 +221,9 @@ pub(crate) struct Comparison {
     /// In real time, whether the bench was silent or late in front of that byte, so that drives that monitor time-outs may have missed their
     /// bytes (ND21 9.9).
     pub silenced: bool,
-    /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: only properties that
+    /// In real time, the first byte of each ring that a drive sent unasked. The bytes after it are a race of clocks: only properties that
     /// hold for every order are compared, up to a check sequence that ends it.
-    pub unasked: Vec<Unasked>,
+    pub unasked: Vec<UnaskedByte>,
     /// Whether a ring was left out: an earlier conversation left such a race open.
     pub left_out: bool,
     /// The first byte that differs only in its time.

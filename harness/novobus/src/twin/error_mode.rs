@@ -32,7 +32,7 @@ pub(super) struct ErrorMode {
     high: Option<(u8, bool)>,
     /// The low byte of the last code of the bus that was read.
     last: Option<u8>,
-    /// It was read behind a high byte of 0, long after the errors were confirmed.
+    /// It was read after a high byte of 0, long after the errors were confirmed.
     stays: bool,
     /// Which bytes of `errorcode` were read as 0 since `Status` had the error bit, long after the errors were confirmed.
     without_code: Option<u8>,
@@ -79,7 +79,8 @@ impl ErrorMode {
     pub(super) fn read(
         &mut self,
         cell: u16,
-        (wanted, value): (u8, u8),
+        wanted: u8,
+        value: u8,
         now: Option<Instant>,
     ) -> Option<bool> {
         let high = self.high.take();
@@ -117,7 +118,7 @@ impl ErrorMode {
                 }
                 Some(value == wanted)
             }
-            ram::STATUS => self.status((wanted, value), late),
+            ram::STATUS => self.status(wanted, value, late),
             _ => None,
         }
     }
@@ -154,18 +155,14 @@ impl ErrorMode {
         Some(value == wanted)
     }
 
-    /// Whether a low byte is that of a code of the bus, and behind a high byte of 0 that of none (14.11).
+    /// Whether a low byte is that of a code of the bus, and after a high byte of 0 that of none (14.11).
     fn is_left_over(&self, value: u8) -> bool {
         self.last == Some(value) && value != 0 && ErrorCode::from_code(value.into()).is_none()
     }
 
     /// The error bit of `Status`: there is none without a code, and the codes of the bus all set it or none does. Which errors set it is
     /// left open (11.8); a time-out always does where another one does.
-    fn status(
-        &mut self,
-        (wanted, value): (u8, u8),
-        late: impl Fn(Instant) -> bool,
-    ) -> Option<bool> {
+    fn status(&mut self, wanted: u8, value: u8, late: impl Fn(Instant) -> bool) -> Option<bool> {
         let bit = value & status::ERROR != 0;
         let without_code = self.without_code.take();
         if bit && wanted & status::ERROR == 0 && self.confirmed.is_some_and(&late) {
@@ -202,7 +199,7 @@ mod tests {
 
     impl Drive {
         fn read(&mut self, cell: u16, wanted: u8, value: u8) -> Option<bool> {
-            self.0.read(cell, (wanted, value), Some(at(self.1)))
+            self.0.read(cell, wanted, value, Some(at(self.1)))
         }
 
         fn confirm(&mut self) {
@@ -219,7 +216,7 @@ mod tests {
         }
     }
 
-    /// ND21 14.10.1, 14.11.14: behind a confirmed error the code of the bus's next one is decided, and no other code.
+    /// ND21 14.10.1, 14.11.14: after a confirmed error the code of the bus's next one is decided, and no other code.
     #[test]
     fn codes_are_judged_behind_a_confirmation() {
         let mut drive = Drive::default();
@@ -248,7 +245,7 @@ mod tests {
         drive.0.reset();
         assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), Some(false));
         assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x02), None);
-        // An error of the bus behind the reset.
+        // An error of the bus after the reset.
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), None);
         drive.0.begin();
         assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), None);

@@ -38,7 +38,7 @@ pub(crate) struct Conversation {
     pub received: Vec<(usize, Instant, Received)>,
     /// When the next conversation began, or when this one was over.
     pub end: Instant,
-    /// When the bench did not look at its ports: what was read behind that came at any time in it.
+    /// When the bench did not look at its ports: what was read after that came at any time in it.
     pub unwatched: Vec<(Instant, Instant)>,
 }
 
@@ -88,7 +88,8 @@ impl Conversation {
                 }
                 LinkEvent::Look(look) => {
                     open.end = open.end.max(look.at);
-                    open.unwatched.extend(look.since.map(|own| (own, look.at)));
+                    let unwatched = look.since.map(|since| (since, look.at));
+                    open.unwatched.extend(unwatched);
                 }
                 LinkEvent::Probe(..) | LinkEvent::Tapped(..) | LinkEvent::Trouble(_) => {}
             }
@@ -101,8 +102,8 @@ impl Conversation {
     pub(crate) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
         let mut damaged = BTreeSet::new();
         let mut sent = Vec::new();
-        let own = self.done.iter().filter(|(at, _)| *at == ring);
-        for (_, done) in own {
+        let here = self.done.iter().filter(|(at, _)| *at == ring);
+        for (_, done) in here {
             let next = sent.len() as u64 + 1;
             match done {
                 Done::Sent(_, byte) => sent.push(*byte),
@@ -123,8 +124,8 @@ impl Conversation {
 
     /// When each byte sent into a ring began.
     pub(crate) fn sent_at(&self, ring: usize) -> Vec<Instant> {
-        let own = self.done.iter().filter(|(at, _)| *at == ring);
-        let starts = own.filter_map(|(_, done)| match done {
+        let here = self.done.iter().filter(|(at, _)| *at == ring);
+        let starts = here.filter_map(|(_, done)| match done {
             Done::Sent(at, _) => Some(*at),
             _ => None,
         });
@@ -145,23 +146,21 @@ impl Conversation {
         step
     }
 
-    /// Whether it is that of a scenario, and not of what comes before or behind it.
+    /// Whether it is that of a scenario, and not of what comes before or after it.
     #[must_use]
     pub(crate) fn has_steps(&self) -> bool {
         let step = |(_, done): &(usize, Done)| matches!(done, Done::Step(_));
         self.done.iter().any(step)
     }
 
-    /// Whether the bench sent something.
     pub(crate) fn sends(&self) -> bool {
         let sent = |(_, done): &(usize, Done)| matches!(done, Done::Sent(..));
         self.done.iter().any(sent)
     }
 
-    /// The bytes received from a ring.
     pub(crate) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
-        let own = self.received.iter().filter(|(at, ..)| *at == ring);
-        own.map(|(_, at, byte)| (*at, *byte)).collect()
+        let here = self.received.iter().filter(|(at, ..)| *at == ring);
+        here.map(|(_, at, byte)| (*at, *byte)).collect()
     }
 }
 
@@ -333,12 +332,9 @@ impl Twin {
                     // Bytes without a gap go out together.
                     let mut bytes = vec![*byte];
                     let mut next = *at + byte_time;
-                    while let Some((_, Done::Sent(_, byte))) =
-                        done.next_if(|(own, done)| match done {
-                            Done::Sent(at, _) => own == ring && *at == next,
-                            _ => false,
-                        })
-                    {
+                    while let Some((_, Done::Sent(_, byte))) = done.next_if(
+                        |(to, done)| matches!(done, Done::Sent(at, _) if to == ring && *at == next),
+                    ) {
                         bytes.push(*byte);
                         next += byte_time;
                     }
@@ -350,7 +346,7 @@ impl Twin {
                     if *moment == Moment::Now {
                         self.link.run_until(*at);
                     }
-                    // A byte that is due is on the wire before a fault that comes behind it.
+                    // A byte that is due is on the wire before a fault that comes after it.
                     self.link.wait(self.link.now());
                     self.link.inject(*ring, *fault, *moment);
                 }
@@ -365,11 +361,11 @@ impl Twin {
         (received, monitored || self.monitors())
     }
 
-    /// Adds what the twin would receive until `tolerance` behind the end of a conversation, where more bytes came than it received itself:
+    /// Adds what the twin would receive until `tolerance` after the end of a conversation, where more bytes came than it received itself:
     /// a drive may be that much earlier than the model. The twin itself stays where it is.
     fn add_later(&self, conversation: &Conversation, tolerance: Span, received: &mut [TwinBytes]) {
-        let more = |(ring, own): (usize, &TwinBytes)| {
-            conversation.received_in(ring).len() > own.bytes.len()
+        let more = |(ring, twin): (usize, &TwinBytes)| {
+            conversation.received_in(ring).len() > twin.bytes.len()
         };
         if !received.iter().enumerate().any(more) {
             return;

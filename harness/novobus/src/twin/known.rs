@@ -96,14 +96,13 @@ pub(crate) fn writes(command: &Command) -> Vec<(u16, Write)> {
 
 /// What is known of a byte.
 #[derive(Clone, Copy, Debug, Default)]
-struct Known {
+struct KnownByte {
     /// The bits that the master has written.
     written: u8,
     /// The bits that it has written in the present attempt.
     now: u8,
     /// Whether the other bits have been read.
     learned: bool,
-    /// The bits that are known.
     value: u8,
     /// Whether it was read as 00, which may have been sent in place of its data (9.7).
     zero: bool,
@@ -139,7 +138,7 @@ pub(super) const LONGEST_CONFIRMATION: Span = Span::from_millis(500);
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
-    cells: BTreeMap<CellByte, Known>,
+    cells: BTreeMap<CellByte, KnownByte>,
     /// Parts of drives that the master has started: from then on they write their cells until the next reset.
     started: BTreeSet<(usize, u8, Worker)>,
     /// What the manual decides of the cells of each drive's program.
@@ -166,9 +165,8 @@ pub(crate) struct Knowledge {
 }
 
 impl Knowledge {
-    /// An attempt begins.
     pub(crate) fn begin(&mut self) {
-        self.cells.values_mut().for_each(|own| own.now = 0);
+        self.cells.values_mut().for_each(|byte| byte.now = 0);
         self.programs.values_mut().for_each(Program::begin);
         self.before_reset.clear();
         self.survived.clear();
@@ -197,17 +195,17 @@ impl Knowledge {
     pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
         let of_it = |place: &CellByte| (place.0, place.1) == (ring, drive);
         // The bits of a cell that are lost, all of them written in the present attempt.
-        let lost = |place: &CellByte, own: &Known| {
+        let lost = |place: &CellByte, byte: &KnownByte| {
             match place.2 {
                 OUTPUTS => Some(self.outputs_of_the_bus(ring, drive)),
                 address => is_lost(address).then_some(0xFF),
             }
-            .filter(|bits| *bits != 0 && own.now & bits == *bits)
-            .map(|bits| own.value & bits)
+            .filter(|bits| *bits != 0 && byte.now & bits == *bits)
+            .map(|bits| byte.value & bits)
         };
         let cells = self.cells.iter().filter(|(place, _)| of_it(place));
         let lost: Vec<_> = cells
-            .filter_map(|(place, own)| Some((*place, lost(place, own)?)))
+            .filter_map(|(place, byte)| Some((*place, lost(place, byte)?)))
             .collect();
         self.before_reset.retain(|place, _| !of_it(place));
         if !self.saved.contains(&(ring, drive)) {
@@ -215,7 +213,8 @@ impl Knowledge {
         }
         self.cells
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
-        self.started.retain(|own| (own.0, own.1) != (ring, drive));
+        self.started
+            .retain(|(at, of, _)| (*at, *of) != (ring, drive));
         self.programs.entry((ring, drive)).or_default().reset();
         self.working.remove(&(ring, drive));
         self.ordered.retain(|place, _| !of_it(place));
@@ -232,9 +231,9 @@ impl Knowledge {
         if self.trusting.contains(&(ring, drive)) {
             return Some(false);
         }
-        let own = self.cells.get(&(ring, drive, ram::FLAGS2))?;
-        let written = own.written & flags2::MONITORING != 0;
-        written.then_some(own.value & flags2::MONITORING != 0)
+        let byte = self.cells.get(&(ring, drive, ram::FLAGS2))?;
+        let written = byte.written & flags2::MONITORING != 0;
+        written.then_some(byte.value & flags2::MONITORING != 0)
     }
 
     /// The master has written to a byte.
@@ -280,16 +279,16 @@ impl Knowledge {
         if (address, write) == (ram::EEPROM_CONTROL, Write::Set(PROG_PARAM)) {
             let cells = &self.cells;
             program.copy(|parameter| {
-                let own = cells.get(&(ring, drive, parameter))?;
+                let byte = cells.get(&(ring, drive, parameter))?;
                 let steady = own::kept(parameter, 0).bits == 0xFF;
-                (steady && (own.learned || own.written == 0xFF)).then_some(own.value)
+                (steady && (byte.learned || byte.written == 0xFF)).then_some(byte.value)
             });
         }
-        let own = self.cells.entry(place).or_default();
-        own.written |= write.bits();
-        own.now |= write.bits();
-        own.value = write.apply(own.value);
-        own.zero = false;
+        let byte = self.cells.entry(place).or_default();
+        byte.written |= write.bits();
+        byte.now |= write.bits();
+        byte.value = write.apply(byte.value);
+        byte.zero = false;
     }
 
     /// Process data of the master's have come to a drive (ND21 9.4, 14.10.3), which writes them where `DataIn` says.
@@ -341,8 +340,8 @@ impl Knowledge {
     /// The outputs that only `WriteIO` sets; none where the master has not read since the last reset what they are configured for.
     fn outputs_of_the_bus(&self, ring: usize, drive: u8) -> u8 {
         let read = |address| {
-            let own = self.cells.get(&(ring, drive, address))?;
-            (own.learned && own.written == 0).then_some(own.value)
+            let byte = self.cells.get(&(ring, drive, address))?;
+            (byte.learned && byte.written == 0).then_some(byte.value)
         };
         match (read(ram::HW_VERSION), read(ram::HW_VERSION2)) {
             (Some(hardware), Some(hardware2)) => own::outputs_of_the_bus(hardware, hardware2),
@@ -362,12 +361,12 @@ impl Knowledge {
 
     /// What a byte must hold, as far as it was written or read.
     pub(crate) fn held(&self, place: CellByte) -> Option<u8> {
-        self.cells.get(&place).map(|own| own.value)
+        self.cells.get(&place).map(|byte| byte.value)
     }
 
     /// The bits of a byte that hold what the master has written in the present attempt.
     pub(crate) fn written_now(&self, place: CellByte, value: u8) -> u8 {
-        let written = self.cells.get(&place).map_or(0, |own| own.now);
+        let written = self.cells.get(&place).map_or(0, |byte| byte.now);
         written & self.kept(place, value)
     }
 
@@ -392,9 +391,9 @@ impl Knowledge {
 
     /// Whether these bits of a cell, which was read for the first time since a reset, have come out of several resets with what was written
     /// before each (ND21 10.5), in the drive or in a model that deviates, and not in both.
-    fn outlives_resets(&mut self, place: CellByte, kept: u8, (wanted, value): (u8, u8)) -> bool {
-        let own = self.cells.get(&place).copied().unwrap_or_default();
-        if kept == 0 || own.written & kept != 0 || own.learned {
+    fn outlives_resets(&mut self, place: CellByte, kept: u8, wanted: u8, value: u8) -> bool {
+        let byte = self.cells.get(&place).copied().unwrap_or_default();
+        if kept == 0 || byte.written & kept != 0 || byte.learned {
             return false;
         }
         let Some(before) = self.before_reset.remove(&place) else {
@@ -414,14 +413,14 @@ impl Knowledge {
         not_lost.len() > 1
     }
 
-    /// The checking byte behind a byte that was read was right: where that byte was 00, the cell holds it.
+    /// The checking byte after a byte that was read was right: where that byte was 00, the cell holds it.
     pub(crate) fn confirm_zero(&mut self, place: CellByte) {
-        if let Some(own) = self.cells.get_mut(&place).filter(|own| own.zero) {
-            *own = Known {
+        if let Some(byte) = self.cells.get_mut(&place).filter(|byte| byte.zero) {
+            *byte = KnownByte {
                 learned: true,
-                value: own.value & own.written,
+                value: byte.value & byte.written,
                 zero: false,
-                ..*own
+                ..*byte
             };
         }
     }
@@ -436,7 +435,7 @@ impl Knowledge {
         }
         let program = self.programs.entry((place.0, place.1)).or_default();
         let now = (!self.disturbed).then_some(self.now);
-        match program.read(place.2, (wanted, value), now) {
+        match program.read(place.2, wanted, value, now) {
             Some(true) => return ByteRead::Right,
             Some(false) => return ByteRead::Wrong,
             None => {}
@@ -448,18 +447,18 @@ impl Knowledge {
             return ByteRead::Wrong;
         }
         let kept = self.kept(place, value);
-        if self.outlives_resets(place, kept, (wanted, value)) {
+        if self.outlives_resets(place, kept, wanted, value) {
             return ByteRead::Wrong;
         }
-        let own = self.cells.entry(place).or_default();
-        let written = own.written & kept;
+        let byte = self.cells.entry(place).or_default();
+        let written = byte.written & kept;
         // Process data went where the drive's own DataIn says, which the model's may not. The model's outputs may serve another purpose.
         let unlike_model = if place.2 == OUTPUTS {
             0xFF
         } else {
             value ^ wanted
         };
-        let mut differ = unlike_model & (value ^ own.value) & written;
+        let mut differ = unlike_model & (value ^ byte.value) & written;
         if kept != 0xFF || own::is_own(place.2) && !own::is_of_the_scope(place.2) {
             return match (differ, written) {
                 (0, 0xFF) => ByteRead::Right,
@@ -467,22 +466,22 @@ impl Knowledge {
                 _ => ByteRead::Wrong,
             };
         }
-        if own.learned {
-            differ |= (value ^ own.value) & !written;
+        if byte.learned {
+            differ |= (value ^ byte.value) & !written;
         }
         if differ != 0 {
             return ByteRead::Wrong;
         }
-        if own.learned || written == 0xFF {
+        if byte.learned || written == 0xFF {
             return ByteRead::Right;
         }
         // In the place of data a drive that refuses the rest of the command sends 00 (9.7): only the checking byte shows that it was none.
         if (wanted, value) == (0, 0) {
-            own.zero = true;
+            byte.zero = true;
             return ByteRead::Right;
         }
-        own.learned = true;
-        own.value = value;
+        byte.learned = true;
+        byte.value = value;
         ByteRead::Learned
     }
 }

@@ -108,7 +108,7 @@ fn a_cell_that_outlives_three_resets_was_not_reset() {
     for recorded in [0xFDA0, 0xFE40, 0xFE97] {
         let place = (0, 1, recorded);
         assert_eq!(
-            outlives_at(place, [1, 2, 3], &|own| own, false),
+            outlives_at(place, [1, 2, 3], &|byte| byte, false),
             ByteRead::Wrong
         );
         assert_eq!(
@@ -116,10 +116,10 @@ fn a_cell_that_outlives_three_resets_was_not_reset() {
             ByteRead::Learned
         );
     }
-    assert_eq!(outlives([1, 2, 3], &|own| own, false), ByteRead::Wrong);
+    assert_eq!(outlives([1, 2, 3], &|byte| byte, false), ByteRead::Wrong);
     assert_eq!(outlives([1, 2, 3], &|_| 2, false), ByteRead::Learned);
-    assert_eq!(outlives([2, 2, 2], &|own| own, false), ByteRead::Learned);
-    assert_eq!(outlives([1, 2, 3], &|own| own, true), ByteRead::Learned);
+    assert_eq!(outlives([2, 2, 2], &|byte| byte, false), ByteRead::Learned);
+    assert_eq!(outlives([1, 2, 3], &|byte| byte, true), ByteRead::Learned);
 }
 
 /// ND21 14.10.3: where process data go is known from a write by any command, and from a read.
@@ -223,7 +223,7 @@ fn a_confirmed_error_is_deleted() {
     assert_eq!(after(501, OF_THE_BUS, OF_THE_BUS), ByteRead::Own);
 }
 
-/// ND21 9.7: a 00 is what the cell holds once the checking byte behind it was right.
+/// ND21 9.7: a 00 is what the cell holds once the checking byte after it was right.
 #[test]
 fn a_zero_is_learned_with_its_checking_byte() {
     let mut known = Knowledge::default();

@@ -17,10 +17,10 @@ mod unasked;
 
 pub(crate) use compare::unknowable;
 pub(crate) use comparison::{
-    Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
+    Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, UnaskedByte,
 };
 pub(crate) use follow::{Conversation, Done, Twin};
 #[cfg(test)]
 pub(crate) use harness_proto::novobus::role::Role;
 pub(crate) use places::{answered, answering, what_of};
-pub(crate) use unasked::{EARLIEST_TIME_OUT, SILENCED, Sent};
+pub(crate) use unasked::{EARLIEST_TIME_OUT, SILENCED, SentTimes};

@@ -27,7 +27,7 @@ pub(crate) fn answering<'a>(
 }
 
 /// The bytes that the model answers, of those that a ring answers where every drive listens. A drive that is silent while it tests itself
-/// (ND21 11.8) loses the bytes of that time. An answer comes one `way` round the ring behind the start of its byte.
+/// (ND21 11.8) loses the bytes of that time. An answer comes one `way` round the ring after the start of its byte.
 pub(super) fn heard(
     (places, roles): (Vec<usize>, Vec<Role>),
     starts: &[Instant],
@@ -53,7 +53,8 @@ pub(super) fn heard(
 /// first one that meets a fault, or that is left out of a long run.
 pub(super) fn known_places(
     sent: &[(u8, bool)],
-    (places, roles): (&[usize], &[Role]),
+    places: &[usize],
+    roles: &[Role],
     expected: &[(Instant, Received)],
     received: &[(Instant, Received)],
 ) -> usize {

@@ -1,4 +1,4 @@
-//! What the manual determines of cells that a drive's own program writes: `Status` and `errorcode` behind an error of the bus
+//! What the manual determines of cells that a drive's own program writes: `Status` and `errorcode` after an error of the bus
 //! ([`ErrorMode`]), and the data read back from cells of the EEPROM (ND21 14.10.5).
 
 use super::error_mode::ErrorMode;
@@ -24,7 +24,6 @@ const STEADY: [RangeInclusive<u8>; 4] = [0x20..=0x4B, 0x50..=0x57, 0x5A..=0x5F, 
 /// What is known of one drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Program {
-    /// Its `Status` and `errorcode`.
     errors: ErrorMode,
     /// What the master has written to the ports of the EEPROM, while it stands there.
     address: Option<u8>,
@@ -76,10 +75,10 @@ impl Program {
     /// The master has written to a cell.
     pub(super) fn write(&mut self, cell: u16, write: Write, now: Instant) {
         let parameter = cell.checked_sub(PARAMETERS).filter(|_| self.copying);
-        if let Some(parameter) = parameter.filter(|own| *own < PARAMETER_COUNT) {
+        if let Some(parameter) = parameter.filter(|parameter| *parameter < PARAMETER_COUNT) {
             // It may have been copied before, or not.
             let address = u16::from(EE_PARAMETERS) + parameter;
-            self.eeprom.retain(|own, _| u16::from(*own) != address);
+            self.eeprom.retain(|cell, _| u16::from(*cell) != address);
         }
         let Write::Set(data) = write else { return };
         self.errors.write(cell, data, now);
@@ -118,10 +117,11 @@ impl Program {
     pub(super) fn read(
         &mut self,
         cell: u16,
-        (wanted, value): (u8, u8),
+        wanted: u8,
+        value: u8,
         now: Option<Instant>,
     ) -> Option<bool> {
-        let of_the_error = self.errors.read(cell, (wanted, value), now);
+        let of_the_error = self.errors.read(cell, wanted, value, now);
         match cell {
             ram::EEPROM_CONTROL => {
                 let shown = value & (READ | READY);
@@ -164,8 +164,8 @@ mod tests {
     fn read(drive: &mut Program, address: u8, value: u8) -> Option<bool> {
         drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
         drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
-        drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
-        drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
+        drive.read(ram::EEPROM_CONTROL, 0x01, READ, Some(NOW));
+        drive.read(ram::EEPROM_BUFFER, address, value, Some(NOW))
     }
 
     /// ND21 14.2.2, 14.10.5: a cell that only a master changes holds what was read before, whatever was written to other cells.
@@ -201,7 +201,7 @@ mod tests {
             drive.copy(|cell| (cell != 0xFF61).then_some(0x33));
         };
         order(&mut drive);
-        drive.read(ram::EEPROM_CONTROL, (READY, READY), Some(NOW));
+        drive.read(ram::EEPROM_CONTROL, READY, READY, Some(NOW));
         drive.write(0xFF7F, Write::Set(0x44), NOW);
         for (address, held) in [(0x20, 0x33), (0x3F, 0x33), (0x40, 0xA5)] {
             assert_eq!(read(&mut drive, address, held), Some(true), "{address:02X}");
@@ -230,15 +230,15 @@ mod tests {
             drive.write(control, Write::Set(command), NOW);
         };
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), None);
+        assert_eq!(drive.read(control, READ, READY, Some(NOW)), None);
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, (READ, READ_BYTE), Some(NOW)), None);
-        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), Some(false));
-        assert_eq!(drive.read(control, (READ, READ), Some(NOW)), None);
+        assert_eq!(drive.read(control, READ, READ_BYTE, Some(NOW)), None);
+        assert_eq!(drive.read(control, READ, READY, Some(NOW)), Some(false));
+        assert_eq!(drive.read(control, READ, READ, Some(NOW)), None);
         order(&mut drive, WRITE_BYTE);
-        assert_eq!(drive.read(control, (READ, WRITE_BYTE), Some(NOW)), None);
+        assert_eq!(drive.read(control, READ, WRITE_BYTE, Some(NOW)), None);
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), None);
+        assert_eq!(drive.read(control, READ, READY, Some(NOW)), None);
     }
 
     /// ND21 14.10.5: what was written to a cell of the customer's is read back, once the drive says that it has read.
@@ -254,28 +254,19 @@ mod tests {
         drive.begin();
         drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C), NOW);
         drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0x5C, 0x5C, Some(NOW)), None);
+        assert_eq!(drive.read(ram::EEPROM_CONTROL, 0x01, READ, Some(NOW)), None);
         assert_eq!(
-            drive.read(ram::EEPROM_BUFFER, (0x5C, 0x5C), Some(NOW)),
-            None
-        );
-        assert_eq!(
-            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW)),
-            None
-        );
-        assert_eq!(
-            drive.read(ram::EEPROM_BUFFER, (0x5C, 0xA5), Some(NOW)),
+            drive.read(ram::EEPROM_BUFFER, 0x5C, 0xA5, Some(NOW)),
             Some(true)
         );
         assert_eq!(
-            drive.read(ram::EEPROM_BUFFER, (0xA5, 0xA4), Some(NOW)),
+            drive.read(ram::EEPROM_BUFFER, 0xA5, 0xA4, Some(NOW)),
             Some(false)
         );
         // A second order takes the byte that was read for an address.
         drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
-        drive.read(ram::EEPROM_CONTROL, (READ, READ), Some(NOW));
-        assert_eq!(
-            drive.read(ram::EEPROM_BUFFER, (0xA5, 0x00), Some(NOW)),
-            None
-        );
+        drive.read(ram::EEPROM_CONTROL, READ, READ, Some(NOW));
+        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0xA5, 0x00, Some(NOW)), None);
     }
 }

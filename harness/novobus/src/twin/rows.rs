@@ -62,11 +62,11 @@ impl Rows<'_> {
         match (before, self.role(index)) {
             (
                 Some(Role::Data {
-                    drive: own,
+                    drive: before,
                     address: first,
                 }),
                 Role::Data { drive, address },
-            ) => own == drive && first.wrapping_add(2) == address,
+            ) => before == drive && first.wrapping_add(2) == address,
             _ => false,
         }
     }
@@ -74,8 +74,8 @@ impl Rows<'_> {
     /// Whether a byte is the low byte of process data (ND21 9.4).
     pub(super) fn is_second_of_process_data(&self, index: usize) -> bool {
         let sync_before = |back: usize| index.checked_sub(back).map(|before| self.role(before));
-        let own = Some(self.role(index));
-        sync_before(1) == own && sync_before(2) != own
+        let role = Some(self.role(index));
+        sync_before(1) == role && sync_before(2) != role
     }
 
     /// Whether the checking byte of the answer in which a byte stands agrees with all of it, and is not the model's: the drive itself has sent
@@ -83,10 +83,10 @@ impl Rows<'_> {
     pub(super) fn is_summed_up(&self, data: usize, drive: u8) -> bool {
         let of_drive = |place: usize| match self.role(place) {
             Role::Check {
-                drive: Some(own),
+                drive: Some(other),
                 length,
                 ..
-            } if own == drive => Some((place, length)),
+            } if other == drive => Some((place, length)),
             _ => None,
         };
         let Some((check, length)) = (data..self.known).find_map(of_drive) else {
@@ -135,9 +135,9 @@ pub(super) fn answer_of(
     drive: u8,
     length: u8,
 ) -> impl Iterator<Item = (usize, &Role)> {
-    let own = move |(_, role): &(usize, &Role)| {
+    let answers = move |(_, role): &(usize, &Role)| {
         matches!(role, Role::Command { .. } | Role::Data { .. }) && role.drive() == Some(drive)
     };
-    let before = roles.iter().enumerate().rev().filter(own);
+    let before = roles.iter().enumerate().rev().filter(answers);
     before.take(usize::from(length).saturating_sub(1))
 }

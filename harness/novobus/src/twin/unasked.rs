@@ -16,7 +16,7 @@ use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 
-/// How long behind the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
+/// How long after the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
 const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
 /// How long a drive that monitors hears nothing at least before it detects a time-out (ND21 9.9). A drive of the model that is wrong on
@@ -33,14 +33,14 @@ const EARLY: Span = Span::from_millis(1);
 /// How inexact the clocks of the bench and of a drive may be over the time of a time-out.
 const CLOCKS: Span = Span::from_micros(500);
 
-/// How many bytes behind a silence come back as they were sent where the bench knows when it ended: they take four times [`EARLY`]. A
+/// How many bytes after a silence come back as they were sent where the bench knows when it ended: they take four times [`EARLY`]. A
 /// computer that was late delivers them together.
 const PUNCTUAL: usize = 16;
 
 /// A byte and when it came.
-type Heard = (Instant, Received);
+type TimedByte = (Instant, Received);
 
-/// Why a difference behind a silence of the bench accuses no drive.
+/// Why a difference after a silence of the bench accuses no drive.
 pub(crate) const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
     (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
 
@@ -56,12 +56,12 @@ pub(crate) struct Race {
 }
 
 /// When the bytes of the master's that are answered were sent, in order, and the other bytes.
-pub(crate) struct Sent<'a> {
+pub(crate) struct SentTimes<'a> {
     /// When each byte that is answered began.
     pub(crate) answered: &'a [Instant],
     /// When every byte began.
     pub(crate) all: &'a [Instant],
-    /// How long behind the start of a byte its answer comes.
+    /// How long after the start of a byte its answer comes.
     pub(crate) way: Span,
     /// How long a drive that monitors hears nothing at least before it detects a time-out.
     pub(crate) earliest: Span,
@@ -69,10 +69,10 @@ pub(crate) struct Sent<'a> {
     pub(crate) complete: bool,
 }
 
-impl Sent<'_> {
+impl SentTimes<'_> {
     /// The first byte received from `from` on that came before the byte of the master's that it would answer.
-    fn first(&self, received: &[Heard], from: Instant) -> Option<usize> {
-        let unasked = |(index, (at, _)): (usize, &Heard)| {
+    fn first(&self, received: &[TimedByte], from: Instant) -> Option<usize> {
+        let unasked = |(index, (at, _)): (usize, &TimedByte)| {
             let early = self.answered.get(index).is_none_or(|start| at < start);
             early && *at >= from
         };
@@ -85,13 +85,16 @@ impl Sent<'_> {
     pub(crate) fn excused_from(
         &self,
         size: RingSize,
-        (expected, received, right): (&[Heard], &[Heard], usize),
-        (may, does): (bool, bool),
+        expected: &[TimedByte],
+        received: &[TimedByte],
+        right: usize,
+        may: bool,
+        does: bool,
     ) -> Option<Instant> {
         if self.nothing_was_missed(expected, received, right) {
             return None;
         }
-        let missed = may.then(|| self.timed_out(size, (expected, received, right)));
+        let missed = may.then(|| self.timed_out(size, expected, received, right));
         let early = (may && self.complete).then(|| self.early(expected, received));
         let late = || (0..received.len()).find(|index| is_late(expected, received, *index));
         let late = does.then(late);
@@ -102,8 +105,8 @@ impl Sent<'_> {
 
     /// The first byte that is as expected and came back before the bench says that it was sent: the bench was late, and does not know how long
     /// the line was silent.
-    fn early(&self, expected: &[Heard], received: &[Heard]) -> Option<usize> {
-        let value = |heard: &[Heard], index: usize| heard.get(index).map(|own| own.1);
+    fn early(&self, expected: &[TimedByte], received: &[TimedByte]) -> Option<usize> {
+        let value = |heard: &[TimedByte], index: usize| heard.get(index).map(|(_, byte)| *byte);
         let same = |index: &usize| value(expected, *index) == value(received, *index);
         let early = |index: &usize| {
             let start = self.answered.get(*index);
@@ -116,15 +119,20 @@ impl Sent<'_> {
     /// before the bench sends it, and none comes back before it has been round the ring. So no drive is without a byte for longer than from the
     /// start of one to the return of the next, less the way round. A computer that is late makes these spans longer, and never shorter. A ring
     /// behind a socket may take bytes before their time; they come back early then.
-    fn nothing_was_missed(&self, expected: &[Heard], received: &[Heard], right: usize) -> bool {
-        let value = |heard: &[Heard], index: usize| heard.get(index).map(|own| own.1);
+    fn nothing_was_missed(
+        &self,
+        expected: &[TimedByte],
+        received: &[TimedByte],
+        right: usize,
+    ) -> bool {
+        let value = |heard: &[TimedByte], index: usize| heard.get(index).map(|(_, byte)| *byte);
         let same = |index: usize| index < right || value(expected, index) == value(received, index);
         let Some(first) = (0..received.len()).find(|index| !same(*index)) else {
             return false;
         };
         let from = received[first].0 - BEFORE_ZEROS;
         let close = |index: usize| {
-            let before = index.checked_sub(1).and_then(|own| self.answered.get(own));
+            let before = index.checked_sub(1).and_then(|at| self.answered.get(at));
             let silence = |start: &Instant| received[index].0.since(*start + self.way);
             before.is_some_and(|start| silence(start) + EARLY < self.earliest)
         };
@@ -137,16 +145,18 @@ impl Sent<'_> {
     }
 
     /// The first byte of the zeros and addresses of drives that have missed their master (ND21 9.9): in front of the byte that it
-    /// answers, the bench left the line silent or was late. A check sequence behind it that comes back whole, with nothing other than
+    /// answers, the bench left the line silent or was late. A check sequence after it that comes back whole, with nothing other than
     /// expected from there to its end, takes every drive out of the error mode (9.8): the drives have missed nothing then.
     fn timed_out(
         &self,
         size: RingSize,
-        (expected, received, right): (&[Heard], &[Heard], usize),
+        expected: &[TimedByte],
+        received: &[TimedByte],
+        right: usize,
     ) -> Option<usize> {
         let silent = |index: usize| {
             let start = self.answered.get(index)?;
-            let before = self.all.partition_point(|own| own < start).checked_sub(1)?;
+            let before = self.all.partition_point(|at| at < start).checked_sub(1)?;
             Some(start.since(self.all[before]) > HARMLESS)
         };
         // No answer comes before it has been round the ring.
@@ -157,8 +167,8 @@ impl Sent<'_> {
         let begins = |index: &usize| {
             early(*index) || is_late(expected, received, *index) || silent(*index).unwrap_or(true)
         };
-        let spelled = |(_, byte): &Heard| byte.error.is_none() && byte.byte < size.drives();
-        // How many of them come from a byte on, and whether nothing else comes behind them. The check sequence begins with some too.
+        let spelled = |(_, byte): &TimedByte| byte.error.is_none() && byte.byte < size.drives();
+        // How many of them come from a byte on, and whether nothing else comes after them. The check sequence begins with some too.
         let mut run = 0;
         let mut in_error_mode = vec![false; received.len()];
         let last = received.iter().rposition(|heard| !spelled(heard));
@@ -170,7 +180,7 @@ impl Sent<'_> {
             in_error_mode[index] = run > usize::from(ZEROS) || at_end || before;
         }
         let same = |index: usize| {
-            index < right || expected.get(index).map(|own| own.1) == Some(received[index].1)
+            index < right || expected.get(index).map(|(_, byte)| *byte) == Some(received[index].1)
         };
         let sequence = SEQUENCE.map(Received::good);
         // Whether a byte differs from a byte on, and whether a whole check sequence comes before the first that does.
@@ -190,11 +200,11 @@ impl Sent<'_> {
         first
     }
 
-    /// The place behind the bytes that have come before the next byte of the master's, from an unasked one on.
-    fn end_of_race(&self, heard: &[Heard], first: usize) -> usize {
+    /// The place after the bytes that have come before the next byte of the master's, from an unasked one on.
+    fn end_of_race(&self, heard: &[TimedByte], first: usize) -> usize {
         let (from, _) = heard[first];
         let next = self.all.partition_point(|start| *start <= from);
-        let before = |(at, _): &Heard| self.all.get(next).is_none_or(|next| at < next);
+        let before = |(at, _): &TimedByte| self.all.get(next).is_none_or(|next| at < next);
         first + heard[first..].partition_point(before)
     }
 
@@ -203,8 +213,10 @@ impl Sent<'_> {
     pub(crate) fn judge(
         &self,
         size: RingSize,
-        (answer, received): (&TwinBytes, &[Heard]),
-        (tolerance, monitored): (Span, bool),
+        answer: &TwinBytes,
+        received: &[TimedByte],
+        tolerance: Span,
+        monitored: bool,
     ) -> Option<Race> {
         let expected = &answer.bytes[..];
         let model = answer.unasked?;
@@ -234,7 +246,7 @@ impl Sent<'_> {
             let first = ring.filter(|ring| *ring == first)?;
             let race = &received[first..self.end_of_race(received, first)];
             let foreign =
-                |(_, byte): &Heard| byte.error.is_some() || !spelled[usize::from(byte.byte)];
+                |(_, byte): &TimedByte| byte.error.is_some() || !spelled[usize::from(byte.byte)];
             Some((first + race.iter().position(foreign)?, Symptom::Value))
         };
         let overdue = monitored && first == model && self.is_overdue(received, model);
@@ -247,15 +259,15 @@ impl Sent<'_> {
         })
     }
 
-    /// Whether a drive that monitors has let the latest time-out pass: the first byte behind a silence that was longer than that answers one of
+    /// Whether a drive that monitors has let the latest time-out pass: the first byte after a silence that was longer than that answers one of
     /// the master's, and is not the zero of a drive in error (ND21 9.7, 9.9). A silence that the drive hears is no shorter than from the
     /// return of the byte before it to the start of the next one, and [`PUNCTUAL`] bytes that come back as they were sent, none before its
     /// time, show that the next one started when the bench says.
-    fn is_overdue(&self, received: &[Heard], first: usize) -> bool {
+    fn is_overdue(&self, received: &[TimedByte], first: usize) -> bool {
         let behind = || {
             let before = first.checked_sub(1)?;
             let start = self.answered.get(before)?;
-            let next = self.all.partition_point(|own| own <= start);
+            let next = self.all.partition_point(|at| at <= start);
             let (next, (back, _)) = (self.all.get(next)?, received.get(before)?);
             let silence = next.since((*start + self.way).max(*back));
             let starts = self.answered.get(first..first + PUNCTUAL)?;
@@ -264,7 +276,7 @@ impl Sent<'_> {
             let late = starts.iter().zip(came);
             let late = late.map(|(start, (at, _))| units(*at) - units(*start + self.way));
             let (least, most) = (late.clone().min()?, late.max()?);
-            let [spread, early] = [EARLY * 2, CLOCKS].map(|own| i128::from(own.units()));
+            let [spread, early] = [EARLY * 2, CLOCKS].map(|span| i128::from(span.units()));
             let is_so = starts[0] == *next && least >= -early && most - least <= spread;
             let is_zero = came[0].1 == Received::good(0);
             Some(silence > LATEST_TIME_OUT + CLOCKS && is_so && !is_zero)
@@ -273,14 +285,16 @@ impl Sent<'_> {
     }
 }
 
-/// What was sent and received behind a check sequence that ends a race (ND21 9.8), what the twin received there, and how many bytes came
+/// What was sent and received after a check sequence that ends a race (ND21 9.8), what the twin received there, and how many bytes came
 /// before. `None` where it is not certain that the drives are as their models again: the master has sent something else than zeros and SYNCO
-/// in front of it, the sequence or a byte behind it is not in its place, or a drive that monitors may not have missed its master.
+/// in front of it, the sequence or a byte after it is not in its place, or a drive that monitors may not have missed its master.
 pub(super) fn behind_a_race(
     conversation: &Conversation,
-    (ring, size): (usize, RingSize),
+    ring: usize,
+    size: RingSize,
     answer: &TwinBytes,
-    (tolerance, one_monitors): (Span, bool),
+    tolerance: Span,
+    one_monitors: bool,
 ) -> Option<(Conversation, TwinBytes, usize)> {
     let fault = |(_, done): &(usize, Done)| matches!(done, Done::Fault(..));
     let (due, _) = answer.bytes[answer.unasked?];
@@ -298,20 +312,20 @@ pub(super) fn behind_a_race(
     let behind: Vec<u8> = sent[last + 1..].iter().map(|(byte, _)| *byte).collect();
     let place = behind
         .windows(SEQUENCE.len())
-        .position(|own| own == SEQUENCE)?;
+        .position(|window| window == SEQUENCE)?;
     if !behind[..place].iter().all(|byte| [0, SYNCO].contains(byte)) {
         return None;
     }
-    // A drive that alone monitors has missed its bytes behind the longest silence in front of the sequence, too.
+    // A drive that alone monitors has missed its bytes after the longest silence in front of the sequence, too.
     let missed = |gap: &[Instant]| gap[1].since(gap[0]) >= LATEST_TIME_OUT + tolerance;
     if !all_missed && !starts[last..=last + 1 + place].windows(2).any(missed) {
         return None;
     }
     let end = last + 1 + place + SEQUENCE.len();
     let answered = answered(size, &sent[end..]).0.len();
-    // Each byte behind the sequence has come back, and the sequence in front of them.
+    // Each byte after the sequence has come back, and the sequence in front of them.
     let received = conversation.received_in(ring);
-    let behind_the_sequence = |heard: &[Heard]| {
+    let behind_the_sequence = |heard: &[TimedByte]| {
         let from = heard.len().checked_sub(answered)?;
         let values: Vec<_> = heard[..from].iter().map(|(_, byte)| *byte).collect();
         values
@@ -339,7 +353,7 @@ pub(super) fn behind_a_race(
 }
 
 /// Whether a byte came so much later than in the model that the bench may have left the line silent for longer than it knows.
-fn is_late(expected: &[Heard], received: &[Heard], index: usize) -> bool {
+fn is_late(expected: &[TimedByte], received: &[TimedByte], index: usize) -> bool {
     let times = expected.get(index).zip(received.get(index));
     times.is_some_and(|((due, _), (at, _))| at.since(*due) > HARMLESS)
 }
@@ -354,14 +368,14 @@ mod tests {
     use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 
     /// ND21 9.8, 9.9: bytes that come a little early, as over a socket, among them a byte that is the drive's choice in front of the zeros of a
-    /// check sequence. The sequence comes back whole, so the drives have missed nothing, whatever differs behind it.
+    /// check sequence. The sequence comes back whole, so the drives have missed nothing, whatever differs after it.
     #[test]
     fn a_check_sequence_ends_what_a_silence_may_have_begun() {
         let byte = Span::from_micros(286);
         let size = RingSize::new(3).expect("a size");
         let way = byte * 4;
-        let ring = |own: u8, last: u8| {
-            let bytes = [own].into_iter().chain(CHECK_SEQUENCE).chain([last]);
+        let ring = |address: u8, last: u8| {
+            let bytes = [address].into_iter().chain(CHECK_SEQUENCE).chain([last]);
             let timed = bytes.enumerate().map(|(place, value)| {
                 let at = Instant::START + byte * place as u64 + way - Span::from_micros(200);
                 (at, Received::good(value))
@@ -371,7 +385,7 @@ mod tests {
         let (expected, received) = (ring(0x60, 0x11), ring(0x00, 0x33));
         let starts = (0..received.len() as u64).map(|place| Instant::START + byte * place);
         let starts: Vec<_> = starts.collect();
-        let sent = Sent {
+        let sent = SentTimes {
             answered: &starts,
             all: &starts,
             way,
@@ -379,15 +393,15 @@ mod tests {
             complete: true,
         };
         let excused = |right: usize| {
-            let excused = sent.excused_from(size, (&expected, &received, right), (true, false));
+            let excused = sent.excused_from(size, &expected, &received, right, true, false);
             excused.is_some()
         };
         assert!(!excused(received.len() - 1));
         assert!(excused(0), "a zero that is not expected stands before it");
     }
 
-    /// ND21 9.9: no drive detects a time-out before 10 ms. A zero in the place of an answer that comes so soon behind the byte before it is
-    /// wrong; behind a longer silence, or a byte that came late, it may be a drive's that has missed its master.
+    /// ND21 9.9: no drive detects a time-out before 10 ms. A zero in the place of an answer that comes so soon after the byte before it is
+    /// wrong; after a longer silence, or a byte that came late, it may be a drive's that has missed its master.
     #[test]
     fn a_zero_behind_a_short_silence_is_not_excused() {
         let byte = Span::from_micros(286);
@@ -400,14 +414,14 @@ mod tests {
                 Instant::START + byte * place + gap
             };
             let starts: Vec<_> = (0..before + 4).map(start).collect();
-            let heard = |last: u8, (early, late): (Span, Span)| -> Vec<Heard> {
+            let heard = |last: u8, (early, late): (Span, Span)| -> Vec<TimedByte> {
                 let places = 0..before + 4;
                 let value = |place: u64| if place < before { SYNCO } else { last };
                 let at = |place: u64| start(place) + way + late - early;
                 let timed = places.map(|place| (at(place), Received::good(value(place))));
                 timed.collect()
             };
-            let sent = Sent {
+            let sent = SentTimes {
                 answered: &starts,
                 all: &starts,
                 way,
@@ -419,7 +433,7 @@ mod tests {
                 heard(0, (early, late)),
             );
             let right = usize::try_from(before).expect("few");
-            let excused = sent.excused_from(size, (&expected, &received, right), (true, false));
+            let excused = sent.excused_from(size, &expected, &received, right, true, false);
             excused.is_some()
         };
         let ms = Span::from_millis;
@@ -451,15 +465,15 @@ mod tests {
         let starts: Vec<_> = (0..100)
             .map(|place| Instant::START + byte * (100 + place))
             .collect();
-        let heard = |early: u64, last: u8| -> Vec<Heard> {
+        let heard = |early: u64, last: u8| -> Vec<TimedByte> {
             let values = (0..100).map(|place| if place < 99 { SYNCO } else { last });
             let came = starts
                 .iter()
                 .map(|start| *start + way - Span::from_millis(early));
             came.zip(values.map(Received::good)).collect()
         };
-        let excused = |early: u64, (may, complete): (bool, bool)| {
-            let sent = Sent {
+        let excused = |early: u64, may: bool, complete: bool| {
+            let sent = SentTimes {
                 answered: &starts,
                 all: &starts,
                 way,
@@ -467,19 +481,19 @@ mod tests {
                 complete,
             };
             let (expected, received) = (heard(0, SYNCO), heard(early, 0x33));
-            let excused = sent.excused_from(size, (&expected, &received, 99), (may, false));
+            let excused = sent.excused_from(size, &expected, &received, 99, may, false);
             excused.is_some()
         };
-        assert!(excused(6, (true, true)));
-        assert!(!excused(4, (true, true)));
-        assert!(!excused(6, (false, true)), "no drive monitors");
-        assert!(!excused(6, (true, false)));
+        assert!(excused(6, true, true));
+        assert!(!excused(4, true, true));
+        assert!(!excused(6, false, true), "no drive monitors");
+        assert!(!excused(6, true, false));
     }
 
     /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
     #[test]
     fn a_model_that_deviates_may_spell_out_more_drives_than_there_are() {
-        let heard = |bytes: &[u8]| -> Vec<Heard> {
+        let heard = |bytes: &[u8]| -> Vec<TimedByte> {
             let timed = (1..).zip(bytes);
             timed
                 .map(|(place, byte)| {
@@ -491,7 +505,7 @@ mod tests {
                 .collect()
         };
         let race = |model: &[u8], ring: &[u8]| {
-            let sent = Sent {
+            let sent = SentTimes {
                 answered: &[],
                 all: &[],
                 way: Span::ZERO,
@@ -503,11 +517,8 @@ mod tests {
                 unasked: Some(0),
             };
             let size = RingSize::new(3).expect("a size");
-            let race = sent.judge(
-                size,
-                (&answer, &heard(ring)),
-                (Span::from_millis(20), false),
-            );
+            let tolerance = Span::from_millis(20);
+            let race = sent.judge(size, &answer, &heard(ring), tolerance, false);
             race.expect("a race").fault
         };
         assert_eq!(race(&[0, 0, 1, 2], &[0, 1, 1, 2]), None);
