@@ -19,7 +19,7 @@ const LONGEST_GAP: u16 = 10_000;
 /// A conversation of telegrams.
 pub(crate) type TelegramTalk = LineTalk<Nordac>;
 
-/// An act of one.
+/// An act of a conversation.
 pub(crate) type TelegramAct = LineAct<TelegramActKind>;
 
 /// What can happen.
@@ -30,7 +30,6 @@ pub(crate) enum TelegramActKind {
     Ask(Request),
     /// A master sends these octets without a gap, whatever they are.
     Octets {
-        /// The octets.
         #[serde(with = "hex")]
         octets: Vec<u8>,
         /// What is wrong with one of them on the line.
@@ -71,7 +70,6 @@ pub(crate) struct Request {
     /// DSAP and SSAP.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) saps: Option<(u8, u8)>,
-    /// The data.
     #[serde(with = "hex", default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) data: Vec<u8>,
     /// What is wrong with it on the line.
@@ -114,7 +112,7 @@ pub(crate) enum Harm {
     Gap(u8, u16),
     /// The last octets, this many, are left out.
     Short(u8),
-    /// This octet stands behind the last one.
+    /// This octet stands after the last one.
     Long(u8),
 }
 
@@ -133,25 +131,25 @@ pub(super) struct Counts(BTreeMap<(u8, u8), Sequence>);
 impl Counts {
     /// The octets of a request, with the count that belongs to it.
     fn octets(&mut self, request: &Request) -> Vec<u8> {
-        let own = self.0.entry((request.sa, request.da)).or_default();
-        *own = match request.count {
-            Count::Next => own.next(),
-            Count::Again => *own,
+        let sequence = self.0.entry((request.sa, request.da)).or_default();
+        *sequence = match request.count {
+            Count::Next => sequence.next(),
+            Count::Again => *sequence,
             Count::First => Sequence::First,
             Count::Without => Sequence::None,
         };
-        let bits = match *own {
+        let bits = match *sequence {
             Sequence::None => 0x40,
             Sequence::First => 0x60,
             Sequence::Counted(false) => 0x50,
             Sequence::Counted(true) => 0x70,
         };
         let control = FrameControl(bits | request.function & 0x0F);
-        let saps = request.saps;
-        let (dsap, ssap) = (saps.map(|own| own.0 & 0x3F), saps.map(|own| own.1 & 0x3F));
+        let saps = request.saps.map(|(dsap, ssap)| (dsap & 0x3F, ssap & 0x3F));
+        let (dsap, ssap) = saps.unzip();
         let (da, sa) = (request.da & 0x7F, request.sa & 0x7F);
         let pdu = Pdu::with_saps(da, sa.min(126), control, dsap, ssap, &request.data);
-        pdu.map(|own| Telegram::Pdu(own).encode().to_vec())
+        pdu.map(|pdu| Telegram::Pdu(pdu).encode().to_vec())
             .unwrap_or_default()
     }
 
@@ -215,7 +213,7 @@ impl TelegramActKind {
         let long =
             |harm: &Option<Harm>| matches!(harm, Some(Harm::Gap(_, gap)) if *gap > LONGEST_GAP);
         match self {
-            Self::Ask(own) => own.data.len() <= 240 && !long(&own.harm),
+            Self::Ask(request) => request.data.len() <= 240 && !long(&request.harm),
             Self::Octets { octets, harm } => (1..=300).contains(&octets.len()) && !long(harm),
             Self::Fault { number, .. } => (1..=25).contains(number),
             Self::Link { .. } | Self::Restart { .. } => true,
@@ -225,10 +223,11 @@ impl TelegramActKind {
     /// How much it holds.
     pub(super) fn weight(&self) -> u64 {
         match self {
-            Self::Ask(own) => {
-                let data: u64 = own.data.iter().map(|own| 2 + u64::from(*own != 0)).sum();
-                let special = u64::from(own.count != Count::Next);
-                10 + data + special + 10 * u64::from(own.harm.is_some())
+            Self::Ask(request) => {
+                let octets = request.data.iter();
+                let data: u64 = octets.map(|octet| 2 + u64::from(*octet != 0)).sum();
+                let special = u64::from(request.count != Count::Next);
+                10 + data + special + 10 * u64::from(request.harm.is_some())
             }
             Self::Octets { octets, harm } => {
                 20 + 3 * octets.len() as u64 + 10 * u64::from(harm.is_some())
@@ -238,7 +237,7 @@ impl TelegramActKind {
     }
 }
 
-/// The rate of a header is that of all stations: this many bits behind the end of a request no right slave begins its reply.
+/// The rate of a header is that of all stations: this many bits after the end of a request no right slave begins its reply.
 pub(super) fn slot(rate: BusRate) -> Span {
     // min T_SDR of Set_Prm is at most 255 bits.
     rate.bit_time() * 260

@@ -4,7 +4,7 @@ use super::act::{Count, Harm, TelegramAct, TelegramActKind, TelegramTalk};
 use super::generate::{self, TelegramSpice};
 use super::idiom::idiom;
 use super::oracle::{self, TelegramDifference};
-use super::play::{Done, TelegramsSeen, play};
+use super::play::{PlayedAct, TelegramsSeen, play};
 use super::text::steps;
 use crate::judge::Symptom;
 use crate::language::Nordac;
@@ -82,7 +82,7 @@ impl LineBus for Nordac {
     type Setup = Setup;
     type Properties = Properties;
     type Said = HeardTelegram;
-    type Done = Done;
+    type Done = PlayedAct;
     type Difference = TelegramDifference;
 
     fn fits(what: &TelegramActKind) -> bool {
@@ -101,13 +101,13 @@ impl LineBus for Nordac {
     fn simpler(what: &TelegramActKind) -> Vec<TelegramActKind> {
         let mut all = Vec::new();
         match what {
-            TelegramActKind::Ask(own) => {
-                let mut plain = own.clone();
+            TelegramActKind::Ask(request) => {
+                let mut plain = request.clone();
                 plain.harm = None;
                 plain.count = Count::Next;
                 all.push(TelegramActKind::Ask(plain));
-                for at in 0..own.data.len() {
-                    let mut lower = own.clone();
+                for at in 0..request.data.len() {
+                    let mut lower = request.clone();
                     lower.data[at] = 0;
                     all.push(TelegramActKind::Ask(lower));
                 }
@@ -160,11 +160,11 @@ impl LineBus for Nordac {
 
     fn header(rig: &Rig, stations: &[Station]) -> Vec<String> {
         let rate = rig.port().map(|port| format!("rate {}", rate(port).name()));
-        let own = stations.iter().flat_map(|(address, ppo)| {
+        let slaves = stations.iter().flat_map(|(address, ppo)| {
             let there = format!("slave {address} ppo {}", ppo.number());
             [there, format!("slave {address} parameter 1621 = 2")]
         });
-        rate.into_iter().chain(own).collect()
+        rate.into_iter().chain(slaves).collect()
     }
 
     fn simulated(header: &Source) -> Result<Setup, Problems> {
@@ -173,16 +173,17 @@ impl LineBus for Nordac {
 
     fn plant(setup: &mut Setup, slave: u8, name: &str) -> Option<bool> {
         let known = DEVIATIONS.named(name)?;
-        let own = setup.slaves.iter_mut().find(|own| own.address == slave);
-        Some(own.map(|own| own.deviation = Some(known)).is_some())
+        let mut slaves = setup.slaves.iter_mut();
+        let wrong = slaves.find(|wrong| wrong.address == slave);
+        Some(wrong.map(|wrong| wrong.deviation = Some(known)).is_some())
     }
 
     fn model(setup: &Setup, properties: &[Properties]) -> Setup {
         let mut model = setup.clone();
         model.master = None;
-        for (slave, own) in model.slaves.iter_mut().zip(properties) {
+        for (slave, values) in model.slaves.iter_mut().zip(properties) {
             slave.deviation = None;
-            slave.properties = *own;
+            slave.properties = *values;
         }
         model
     }
@@ -199,8 +200,8 @@ impl LineBus for Nordac {
         vec![vec![Properties::default(); setup.slaves.len()]]
     }
 
-    fn neighbours(setup: &Setup, place: usize, own: &Properties) -> Vec<Properties> {
-        oracle::neighbours(own, setup.slaves[place].posicon).collect()
+    fn neighbours(setup: &Setup, place: usize, properties: &Properties) -> Vec<Properties> {
+        oracle::neighbours(properties, setup.slaves[place].posicon).collect()
     }
 
     fn lines(setup: &Setup, values: &[Properties]) -> Vec<String> {
@@ -224,8 +225,8 @@ impl LineBus for Nordac {
         oracle::difference(setup, place, plays, under)
     }
 
-    fn basis(own: &TelegramDifference) -> (&str, &[String], bool) {
-        (&own.section, &own.under, own.what == Symptom::Time)
+    fn basis(found: &TelegramDifference) -> (&str, &[String], bool) {
+        (&found.section, &found.under, found.what == Symptom::Time)
     }
 
     fn steps(
@@ -244,13 +245,13 @@ fn features(seen: &TelegramsSeen) -> Vec<u32> {
     let mut found = Vec::new();
     let mut before = 0;
     let mut replies = seen.said.iter().peekable();
-    let ends = seen.done.iter().skip(1).map(|own| own.at);
+    let ends = seen.done.iter().skip(1).map(|done| done.at);
     let ends = ends.chain([Instant::NEVER]);
     for (done, end) in seen.done.iter().zip(ends) {
-        let request = done.sent.as_ref().map_or(1, |own| kind(&own.octets));
+        let request = done.sent.as_ref().map_or(1, |sent| kind(&sent.octets));
         let mut reply = 0;
-        while let Some(own) = replies.next_if(|own| own.at <= end) {
-            reply = hash(&[reply, kind(&own.octets), u32::from(own.error.is_some())]);
+        while let Some(next) = replies.next_if(|next| next.at <= end) {
+            reply = hash(&[reply, kind(&next.octets), u32::from(next.error.is_some())]);
         }
         found.push(hash(&[1, request, reply]));
         found.push(hash(&[2, before, reply]));
@@ -266,17 +267,17 @@ fn kind(octets: &[u8]) -> u32 {
         return hash(&[3, octets.first().copied().unwrap_or(0).into()]);
     };
     let data = pdu.data();
-    let sap = pdu.dsap().map_or(0, |own| 1 + u32::from(own));
+    let sap = pdu.dsap().map_or(0, |sap| 1 + u32::from(sap));
     let head = hash(&[sap, u32::from(pdu.fc().0 & 0x4F), data.len() as u32]);
     let word = |at: usize| {
         data.get(at..at + 2)
-            .map_or(0, |own| u32::from(own[0]) << 8 | u32::from(own[1]))
+            .map_or(0, |word| u32::from(word[0]) << 8 | u32::from(word[1]))
     };
     match (pdu.dsap(), data.len()) {
         (None, 20 | 12) => hash(&[head, word(0), word(8)]),
         (None, _) => hash(&[head, word(0)]),
         (Some(_), _) => {
-            let all: Vec<_> = data.iter().take(8).map(|own| u32::from(*own)).collect();
+            let all: Vec<_> = data.iter().take(8).map(|octet| u32::from(*octet)).collect();
             hash(&[&[head][..], &all].concat())
         }
     }

@@ -27,7 +27,6 @@ pub(crate) enum TelegramSpice {
     Services,
     /// Set_Prm and Chk_Cfg, right and wrong, and the watchdog.
     Setup,
-    /// Global_Control.
     Control,
     /// Other masters and other stations.
     Masters,
@@ -44,7 +43,6 @@ pub(crate) enum TelegramSpice {
 }
 
 impl TelegramSpice {
-    /// All with their names.
     pub(crate) const NAMES: [(&'static str, Self); 14] = [
         ("motion", Self::Motion),
         ("words", Self::Words),
@@ -78,7 +76,6 @@ const SETPOINTS: [u16; 10] = [
     0, 0x2000, 0x4000, 0x4001, 0xC000, 0xE000, 0x7FFF, 0x8000, 0x0001, 0x1234,
 ];
 
-/// Services that read.
 const READING: [Service; 4] = [
     Service::SlaveDiag,
     Service::GetCfg,
@@ -105,7 +102,7 @@ pub(super) fn close(wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
     vec![last, wire.reads(Service::SlaveDiag)]
 }
 
-/// Acts of a spice, mostly with a time behind them.
+/// Acts of a spice, mostly with a time after them.
 pub(super) fn part(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
     let mut acts = single(spice, wire, dice);
     if dice.percent(60)
@@ -116,7 +113,6 @@ pub(super) fn part(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<Tel
     acts
 }
 
-/// Acts of a spice.
 fn single(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
     match spice {
         TelegramSpice::Motion => vec![exchange(wire, *dice.pick(&WORDS).unwrap_or(&0x047E), dice)],
@@ -155,10 +151,10 @@ fn single(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<TelegramAct>
                     found: false,
                 },
                 1 => TelegramActKind::Link { slave, found: true },
-                own => TelegramActKind::Fault {
+                choice => TelegramActKind::Fault {
                     slave,
                     number: 1 + dice.below(25) as u8,
-                    on: own == 2,
+                    on: choice == 2,
                 },
             };
             vec![TelegramAct::new(what, 0)]
@@ -217,7 +213,7 @@ fn set_up(wire: Wire, dice: &mut Dice) -> TelegramAct {
         0 | 1 => wire.configuration(),
         2 => {
             let others: [&[u8]; 6] = [&[0xF3, 0xF1], &[0xF3, 0xF5], &[0xF1], &[0xF5], &[], &[0xF3]];
-            let mut cfg = dice.pick(&others).map_or(Vec::new(), |own| own.to_vec());
+            let mut cfg = dice.pick(&others).map_or(Vec::new(), |cfg| cfg.to_vec());
             if dice.percent(40) {
                 cfg = wire.ppo.cfg().to_vec();
                 cfg.push(dice.byte());
@@ -248,8 +244,9 @@ fn set_up(wire: Wire, dice: &mut Dice) -> TelegramAct {
 
 /// Asks for a reply to Global_Control, which has none.
 pub(super) const fn by_srd(act: &mut TelegramAct, slave: u8) {
-    if let TelegramActKind::Ask(own) = &mut act.what {
-        (own.da, own.function, own.count) = (slave, Function::SrdHigh.code(), Count::Next);
+    if let TelegramActKind::Ask(request) = &mut act.what {
+        (request.da, request.function, request.count) =
+            (slave, Function::SrdHigh.code(), Count::Next);
     }
 }
 
@@ -260,14 +257,14 @@ fn other_station(wire: Wire, dice: &mut Dice) -> TelegramAct {
         1 => set_up(wire, dice),
         _ => service(wire, dice),
     };
-    if let TelegramActKind::Ask(own) = &mut act.what {
+    if let TelegramActKind::Ask(request) = &mut act.what {
         match dice.below(3) {
             0 => {
-                own.da = *dice
+                request.da = *dice
                     .pick(&[wire.slave + 1, 127, 0, wire.slave ^ 0x40])
                     .unwrap_or(&127)
             }
-            _ => own.sa = *dice.pick(&[3, 1, 0, 126]).unwrap_or(&3),
+            _ => request.sa = *dice.pick(&[3, 1, 0, 126]).unwrap_or(&3),
         }
     }
     act
@@ -280,13 +277,13 @@ fn other_function(wire: Wire, dice: &mut Dice) -> TelegramAct {
         _ => service(wire, dice),
     };
     act.times = 1;
-    if let TelegramActKind::Ask(own) = &mut act.what {
+    if let TelegramActKind::Ask(request) = &mut act.what {
         match dice.below(4) {
-            0 => own.function = dice.byte() & 0x0F,
-            1 => own.saps = Some((*dice.pick(&[55, 58, 54, 63, 0, 59]).unwrap_or(&55), 62)),
+            0 => request.function = dice.byte() & 0x0F,
+            1 => request.saps = Some((*dice.pick(&[55, 58, 54, 63, 0, 59]).unwrap_or(&55), 62)),
             _ => {
                 let counts = [Count::Again, Count::Again, Count::First, Count::Without];
-                own.count = *dice.pick(&counts).unwrap_or(&Count::Again);
+                request.count = *dice.pick(&counts).unwrap_or(&Count::Again);
             }
         }
     }
@@ -323,8 +320,8 @@ fn damaged(wire: Wire, dice: &mut Dice) -> TelegramAct {
     };
     act.times = 1;
     if dice.percent(70) {
-        if let TelegramActKind::Ask(own) = &mut act.what {
-            own.harm = Some(harm(own.data.len() + 9, dice));
+        if let TelegramActKind::Ask(request) = &mut act.what {
+            request.harm = Some(harm(request.data.len() + 9, dice));
         }
         return act;
     }
@@ -335,10 +332,10 @@ fn damaged(wire: Wire, dice: &mut Dice) -> TelegramAct {
 fn octets(slave: u8, dice: &mut Dice) -> TelegramActKind {
     let variable = |body: &[u8]| {
         let length = body.len() as u8;
-        let mut own = vec![0x68, length, length, 0x68];
-        own.extend(body);
-        own.extend([check_sum(body), 0x16]);
-        own
+        let mut telegram = vec![0x68, length, length, 0x68];
+        telegram.extend(body);
+        telegram.extend([check_sum(body), 0x16]);
+        telegram
     };
     let plain = |fc: u8| vec![0x10, slave, OWN, fc, check_sum(&[slave, OWN, fc]), 0x16];
     let mut harm = None;
@@ -386,11 +383,11 @@ fn of_length(wire: Wire, dice: &mut Dice) -> TelegramAct {
         _ => exchange(wire, stw::READY, dice),
     };
     act.times = 1;
-    if let TelegramActKind::Ask(own) = &mut act.what {
+    if let TelegramActKind::Ask(request) = &mut act.what {
         let length = *dice
             .pick(&[0, 1, 2, 4, 8, 11, 12, 13, 20, 28])
             .unwrap_or(&4);
-        own.data.resize(length, 0);
+        request.data.resize(length, 0);
     }
     act
 }
@@ -398,11 +395,11 @@ fn of_length(wire: Wire, dice: &mut Dice) -> TelegramAct {
 /// Another data octet.
 pub(super) fn change(what: &mut TelegramActKind, dice: &mut Dice) {
     match what {
-        TelegramActKind::Ask(own) if !own.data.is_empty() => {
-            let at = dice.below(own.data.len());
-            own.data[at] = dice.byte();
+        TelegramActKind::Ask(request) if !request.data.is_empty() => {
+            let at = dice.below(request.data.len());
+            request.data[at] = dice.byte();
         }
-        TelegramActKind::Ask(own) => own.harm = Some(harm(9, dice)),
+        TelegramActKind::Ask(request) => request.harm = Some(harm(9, dice)),
         TelegramActKind::Octets { octets, .. } => {
             let at = dice.below(octets.len());
             if let Some(octet) = octets.get_mut(at) {

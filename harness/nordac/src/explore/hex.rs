@@ -22,6 +22,6 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
 
 /// The octets as a scenario writes them.
 pub(super) fn written(octets: &[u8]) -> String {
-    let digits: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
+    let digits: Vec<_> = octets.iter().map(|octet| format!("{octet:02X}")).collect();
     digits.join(" ")
 }

@@ -14,7 +14,7 @@ fn words(wire: Wire, control: u16, setpoint: u16) -> TelegramAct {
     wire.exchange([control, setpoint, 0, 0, 0, 0], Pkw::default())
 }
 
-/// The same, this often, and with this number of milliseconds behind each.
+/// The same, this often, and with this number of milliseconds after each.
 fn often(mut act: TelegramAct, times: u8, millis: u64) -> TelegramAct {
     (act.times, act.wait_us) = (times, millis * 1_000);
     act
@@ -188,8 +188,8 @@ fn masters(wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
         let mut last = wire.reads(Service::SlaveDiag);
         let mut again = other.reads(Service::SlaveDiag);
         for act in [&mut last, &mut again] {
-            if let TelegramActKind::Ask(own) = &mut act.what {
-                own.count = Count::First;
+            if let TelegramActKind::Ask(request) = &mut act.what {
+                request.count = Count::First;
             }
         }
         acts.extend([last, again, other.reads(Service::SlaveDiag)]);

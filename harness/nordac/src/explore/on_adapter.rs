@@ -1,8 +1,8 @@
 //! Conversations with NORDAC slaves behind an adapter.
 //!
 //! The telegrams of a conversation are what was sent, and what came between one request and the next. A reply that the computer or the adapter
-//! brings only behind the next request would be taken for the reply to that one. So a request without a reply is waited for twice as long as
-//! the rig's file grants, and a conversation in which something comes unasked behind such a request is not judged.
+//! brings only after the next request would be taken for the reply to that one. So a request without a reply is waited for twice as long as
+//! the rig's file grants, and a conversation in which something comes unasked after such a request is not judged.
 
 use super::act::{Counts, OutgoingTelegram, TelegramAct, TelegramActKind};
 use super::generate::TelegramSpice;
@@ -21,12 +21,12 @@ use harness_bench::link::{Line as _, Octets as _};
 use harness_bench::rig::{Ends, Rig};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::PpoType;
-use harness_proto::profibus::fdl::BROADCAST;
+use harness_proto::profibus::fdl::{BROADCAST, Function, Pdu};
 use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 
-/// How long the line is left alone behind a telegram that is not answered.
+/// How long the line is left alone after a telegram that is not answered.
 const UNANSWERED: Span = Span::from_millis(2);
 
 /// The same at the end of a conversation.
@@ -34,7 +34,7 @@ const REST: Span = Span::from_millis(20);
 
 /// What is known of the slaves of a run.
 #[derive(Debug)]
-pub(crate) struct Kept {
+pub(crate) struct SlaveLog {
     /// The telegrams of the last conversation.
     heard: Vec<TelegramRun>,
     /// What the slaves held before; nothing where no conversation may write.
@@ -43,40 +43,41 @@ pub(crate) struct Kept {
 
 impl LineRig for Nordac {
     type Drives = Inverters;
-    type Kept = Kept;
+    type Kept = SlaveLog;
 
     fn stations(rig: &Rig, session: Option<&Session>) -> Vec<(u8, PpoType)> {
         let listed = || rig.port().map(slaves).unwrap_or_default();
-        let own = session.map_or_else(listed, |own| own.slaves().to_vec());
-        own.iter()
-            .map(|own| (own.address, own.ppo.unwrap_or_default()))
+        let slaves = session.map_or_else(listed, |session| session.slaves().to_vec());
+        slaves
+            .iter()
+            .map(|slave| (slave.address, slave.ppo.unwrap_or_default()))
             .collect()
     }
 
     fn lacks(rig: &Rig, allow_motion: bool, spice: TelegramSpice) -> Option<&'static str> {
-        use TelegramSpice as Own;
-        let own = limits(rig, allow_motion);
-        let motion = (own.motion, "allow_motion");
-        let eeprom = (own.eeprom, "allow_eeprom");
-        let bus_settings = (own.bus_settings, "allow_bus_settings");
-        let motor_data = (own.motor_data, "allow_motor_data");
+        use TelegramSpice as Spice;
+        let limits = limits(rig, allow_motion);
+        let motion = (limits.motion, "allow_motion");
+        let eeprom = (limits.eeprom, "allow_eeprom");
+        let bus_settings = (limits.bus_settings, "allow_bus_settings");
+        let motor_data = (limits.motor_data, "allow_motor_data");
         let needed: &[_] = match spice {
-            Own::Tasks | Own::Services | Own::Setup | Own::Control => &[],
-            Own::Functions | Own::Lengths => &[],
-            Own::Motion | Own::Words => &[motion],
-            Own::Masters => &[(own.other_stations, "allow_other_stations")],
-            Own::Damage => &[motion, eeprom, motor_data, bus_settings],
+            Spice::Tasks | Spice::Services | Spice::Setup | Spice::Control => &[],
+            Spice::Functions | Spice::Lengths => &[],
+            Spice::Motion | Spice::Words => &[motion],
+            Spice::Masters => &[(limits.other_stations, "allow_other_stations")],
+            Spice::Damage => &[motion, eeprom, motor_data, bus_settings],
             // Every write is permanent (NORDAC 5).
-            Own::Changes => &[eeprom],
-            Own::Bus => &[eeprom, bus_settings],
-            Own::World | Own::Power => return Some(ONLY_SIMULATED),
+            Spice::Changes => &[eeprom],
+            Spice::Bus => &[eeprom, bus_settings],
+            Spice::World | Spice::Power => return Some(ONLY_SIMULATED),
         };
-        needed.iter().find(|own| !own.0).map(|own| own.1)
+        needed.iter().find(|limit| !limit.0).map(|limit| limit.1)
     }
 
-    fn keep(session: &mut Session) -> Result<Kept, ExploreError> {
+    fn keep(session: &mut Session) -> Result<SlaveLog, ExploreError> {
         let gate = session.guarded().slaves();
-        let before = match gate.is_some_and(|own| own.limits().eeprom) {
+        let before = match gate.is_some_and(|gate| gate.limits().eeprom) {
             true => {
                 let read = HeldBefore::read(session);
                 Some(read.map_err(|error| ExploreError::Lost(error.to_string()))?)
@@ -84,20 +85,20 @@ impl LineRig for Nordac {
             false => None,
         };
         let heard = Vec::new();
-        Ok(Kept { heard, before })
+        Ok(SlaveLog { heard, before })
     }
 
-    fn tidy(session: &mut Session, kept: &mut Kept) {
-        if let Some(before) = kept.before.as_mut().filter(|own| own.has_written()) {
+    fn tidy(session: &mut Session, kept: &mut SlaveLog) {
+        if let Some(before) = kept.before.as_mut().filter(|before| before.has_written()) {
             // What is not put back is said at the end of the run.
             let _as_far_as_they_do = session.make_safe();
             let _said_later = before.put_back(session);
         }
     }
 
-    fn restore(session: &mut Session, kept: &mut Kept) -> Vec<String> {
+    fn restore(session: &mut Session, kept: &mut SlaveLog) -> Vec<String> {
         let before = kept.before.as_mut();
-        before.map_or_else(Vec::new, |own| own.put_back(session))
+        before.map_or_else(Vec::new, |before| before.put_back(session))
     }
 
     fn denied(session: &Session, talk: &TelegramTalk, seen: &TelegramsSeen) -> Option<String> {
@@ -114,8 +115,10 @@ impl LineRig for Nordac {
         let began = session.guarded().now();
         let mut replies = seen.said.iter().peekable();
         for done in &seen.done {
-            while let Some(reply) = replies.next_if(|own| own.at <= done.at) {
-                reply.octets.iter().for_each(|own| gate.hear(Some(*own)));
+            while let Some(reply) = replies.next_if(|reply| reply.at <= done.at) {
+                for octet in &reply.octets {
+                    gate.hear(Some(*octet));
+                }
             }
             let Some(sent) = &done.sent else { continue };
             if sent.bad.is_some() {
@@ -128,19 +131,19 @@ impl LineRig for Nordac {
             }
             let now = began + done.at.since_start();
             let mut octets = sent.octets.iter();
-            if let Some(why) = octets.find_map(|own| gate.admit(now, *own).err()) {
+            if let Some(why) = octets.find_map(|octet| gate.admit(now, *octet).err()) {
                 return Some(format!("a telegram is not sent: {why}"));
             }
         }
         None
     }
 
-    fn converse(session: &mut Session, kept: &mut Kept, talk: &TelegramTalk) -> Option<String> {
+    fn converse(session: &mut Session, kept: &mut SlaveLog, talk: &TelegramTalk) -> Option<String> {
         kept.heard.clear();
         let telegrams = telegrams(talk);
         if let Some(before) = &mut kept.before {
             let sent = telegrams.iter().flatten().flatten();
-            let sent = sent.map(|own| own.octets.as_slice());
+            let sent = sent.map(|telegram| telegram.octets.as_slice());
             match before.sends(session, sent) {
                 Ok(None) => {}
                 Ok(Some(why)) => return Some(why),
@@ -176,11 +179,9 @@ impl LineRig for Nordac {
         })
     }
 
-    fn judged(_: &Session, kept: &Kept) -> (Option<TelegramDifference>, bool) {
-        let first = judge_runs(kept.heard.iter().cloned())
-            .breaches
-            .into_iter()
-            .next();
+    fn judged(_: &Session, kept: &SlaveLog) -> (Option<TelegramDifference>, bool) {
+        let judged = judge_runs(kept.heard.iter().cloned());
+        let first = judged.breaches.into_iter().next();
         (first.map(TelegramDifference::from), false)
     }
 }
@@ -201,15 +202,15 @@ fn telegrams(talk: &TelegramTalk) -> Vec<Vec<Option<OutgoingTelegram>>> {
 }
 
 impl From<Breach> for TelegramDifference {
-    fn from(own: Breach) -> Self {
+    fn from(breach: Breach) -> Self {
         Self {
-            what: own.what,
-            part: own.part,
-            section: own.section.to_owned(),
-            slave: Some(own.slave),
-            telegram: own.telegram,
+            what: breach.what,
+            part: breach.part,
+            section: breach.section.to_owned(),
+            slave: Some(breach.slave),
+            telegram: breach.telegram,
             under: Vec::new(),
-            about: own.about,
+            about: breach.about,
         }
     }
 }
@@ -238,7 +239,7 @@ impl Conversation<'_> {
         }
         let sent = octets
             .iter()
-            .map(|own| LineByte::seen(end, Some(*own), Some(*own), None));
+            .map(|octet| LineByte::seen(end, Some(*octet), Some(*octet), None));
         self.heard.push(TelegramRun {
             from: None,
             octets: sent.collect(),
@@ -246,11 +247,9 @@ impl Conversation<'_> {
         let owed = match Telegram::decode(octets) {
             Decoded::Value { value, used } if used == octets.len() => {
                 let pdu = value.pdu();
-                self.asked = pdu.map(|own| own.da());
-                pdu.is_some_and(|own| {
-                    let sends_only = own.fc().function().is_some_and(|own| own.is_sdn());
-                    own.da() != BROADCAST && !sends_only
-                })
+                self.asked = pdu.map(|pdu| pdu.da());
+                let sends_only = |pdu: &Pdu| pdu.fc().function().is_some_and(Function::is_sdn);
+                pdu.is_some_and(|pdu| pdu.da() != BROADCAST && !sends_only(pdu))
             }
             // Somebody may read a request out of it.
             _ => true,
@@ -269,14 +268,14 @@ impl Conversation<'_> {
         let mut octets = Vec::new();
         let mut telegram = Buffer::new();
         'heard: loop {
-            while let Some((at, own)) = self.link.receive_octet(0) {
+            while let Some((at, octet)) = self.link.receive_octet(0) {
                 octets.push(LineByte::seen(
                     at,
-                    Some(own.byte),
-                    Some(own.byte),
-                    own.error,
+                    Some(octet.byte),
+                    Some(octet.byte),
+                    octet.error,
                 ));
-                let fits = telegram.push(own.byte) && own.error.is_none();
+                let fits = telegram.push(octet.byte) && octet.error.is_none();
                 if fits && matches!(Telegram::decode(&telegram), Decoded::Value { .. }) {
                     break 'heard;
                 }

@@ -1,7 +1,7 @@
 //! How replies of slaves differ, and what of them the manual leaves open.
 
 use super::hex;
-use super::play::{Done, TelegramsSeen};
+use super::play::{PlayedAct, TelegramsSeen};
 use crate::judge::{ReplySubject, Symptom};
 use crate::simulate::Setup;
 use harness_bench::capture::runs::HeardTelegram;
@@ -16,13 +16,11 @@ const POSICON: &str = "position-count";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TelegramDifference {
-    /// How it differs.
     pub(crate) what: Symptom,
     /// The service, and the part of its data.
     pub(crate) part: String,
     /// The section that says most about it, such as `3.2.2`, or `EN 2`.
     pub(crate) section: String,
-    /// The slave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) slave: Option<u8>,
     /// The number of the telegram among those of the slaves, counted from 1.
@@ -38,9 +36,9 @@ pub(crate) struct TelegramDifference {
 fn values() -> impl Iterator<Item = (&'static Description, String)> {
     PROPERTIES.iter().flat_map(|property| {
         let words: Vec<String> = match property.accepts {
-            Accepts::Words(words) => words.iter().map(|own| (*own).to_owned()).collect(),
+            Accepts::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
             Accepts::Count { least, most, .. } => {
-                (least..=most).map(|own| own.to_string()).collect()
+                (least..=most).map(|count| count.to_string()).collect()
             }
         };
         words.into_iter().map(move |word| (property, word))
@@ -48,24 +46,24 @@ fn values() -> impl Iterator<Item = (&'static Description, String)> {
 }
 
 /// All properties that differ in one open point.
-pub(super) fn neighbours(own: &Properties, posicon: bool) -> impl Iterator<Item = Properties> {
-    let own = *own;
+pub(super) fn neighbours(base: &Properties, posicon: bool) -> impl Iterator<Item = Properties> {
+    let base = *base;
     let shown = values().filter(move |(property, _)| posicon || property.name != POSICON);
     shown.filter_map(move |(property, word)| {
-        let mut new = own;
-        (property.set(&mut new, &word) && new != own).then_some(new)
+        let mut new = base;
+        (property.set(&mut new, &word) && new != base).then_some(new)
     })
 }
 
 /// The open points of an assignment as header lines, where they do not have their default.
 pub(super) fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String> {
     let mut lines = Vec::new();
-    for (slave, own) in under_test.slaves.iter().zip(assignment) {
+    for (slave, properties) in under_test.slaves.iter().zip(assignment) {
         let usual = Properties::default();
         for (property, word) in values() {
-            let (mut same, mut other) = (*own, usual);
+            let (mut same, mut other) = (*properties, usual);
             let set = property.set(&mut same, &word) && property.set(&mut other, &word);
-            if set && same == *own && other != usual {
+            if set && same == *properties && other != usual {
                 lines.push(format!(
                     "slave {} property {} = {word}",
                     slave.address, property.name
@@ -82,7 +80,7 @@ pub(super) fn unlike(a: &HeardTelegram, b: &HeardTelegram) -> i64 {
     let length = a.octets.len().abs_diff(b.octets.len()) as i64;
     let error = i64::from(a.error != b.error);
     // The sum at the end says the same again.
-    let body = |own: &HeardTelegram| own.octets.len().saturating_sub(2);
+    let body = |telegram: &HeardTelegram| telegram.octets.len().saturating_sub(2);
     let octets = a.octets[..body(a)].iter().zip(&b.octets[..body(b)]);
     let bits: u32 = octets.map(|(a, b)| (a ^ b).count_ones()).sum();
     let time = i64::from(a.at != b.at);
@@ -109,33 +107,35 @@ pub(super) fn difference(
         _ => (wanted, expected),
     };
     let about_it = about_it?;
-    let request = asked(of, about_it).and_then(|own| of.done[own].sent.as_ref());
-    let request = request.and_then(|own| Telegram::decode(&own.octets).value());
+    let request = asked(of, about_it).and_then(|act| of.done[act].sent.as_ref());
+    let request = request.and_then(|sent| Telegram::decode(&sent.octets).value());
     let place = match (
         wanted.and_then(HeardTelegram::telegram),
         came.and_then(HeardTelegram::telegram),
     ) {
         (Some(Telegram::Pdu(a)), Some(Telegram::Pdu(b))) if what == Symptom::Value => {
-            let slaves = &setup.slaves;
-            let own = slaves.iter().find(|own| Some(own.address) == about_it.from);
-            let ppo = own.map(|own| own.ppo).unwrap_or_default();
+            let mut slaves = setup.slaves.iter();
+            let slave = slaves.find(|slave| Some(slave.address) == about_it.from);
+            let ppo = slave.map(|slave| slave.ppo).unwrap_or_default();
             ReplySubject::of_data(request.as_ref(), ppo, &a, &b)
         }
         _ => ReplySubject::of(request.as_ref()),
     };
-    let said = |own: Option<&HeardTelegram>| {
-        own.map_or("no telegram".to_owned(), |own| {
-            let error = own.error.map_or(String::new(), |(octet, error)| {
+    let said = |telegram: Option<&HeardTelegram>| {
+        telegram.map_or("no telegram".to_owned(), |telegram| {
+            let error = telegram.error.map_or(String::new(), |(octet, error)| {
                 format!(" with a {error} error in octet {octet}")
             });
-            format!("{}{error}, ended at {},", hex::written(&own.octets), own.at)
+            let octets = hex::written(&telegram.octets);
+            format!("{octets}{error}, ended at {},", telegram.at)
         })
     };
     let any = match under.is_empty() {
         true => "",
         false => " with the values of open points that explain most",
     };
-    let asked_for = request.map_or("other octets".to_owned(), |own| hex::written(&own.encode()));
+    let asked_for = request.map(|request| hex::written(&request.encode()));
+    let asked_for = asked_for.unwrap_or("other octets".to_owned());
     Some(TelegramDifference {
         what,
         part: place.part,
@@ -153,8 +153,8 @@ pub(super) fn difference(
 }
 
 /// Behind which act a telegram was sent, counted as they happened.
-fn asked(seen: &TelegramsSeen, own: &HeardTelegram) -> Option<usize> {
-    let before = |done: &Done| done.sent.is_some() && done.at < own.at;
+fn asked(seen: &TelegramsSeen, telegram: &HeardTelegram) -> Option<usize> {
+    let before = |done: &PlayedAct| done.sent.is_some() && done.at < telegram.at;
     seen.done.iter().rposition(before)
 }
 

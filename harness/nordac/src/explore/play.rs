@@ -11,15 +11,15 @@ use harness_bench::scenario::language::Language as _;
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::Stimulus;
 
-/// How long a case goes on behind its last act.
+/// How long a case goes on after its last act.
 const TAIL: Span = Span::from_millis(20);
 
 /// What a case has shown: what the slaves sent, and each act as often as it happened.
-pub(crate) type TelegramsSeen = LineSeen<HeardTelegram, Done>;
+pub(crate) type TelegramsSeen = LineSeen<HeardTelegram, PlayedAct>;
 
 /// An act that has happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Done {
+pub(crate) struct PlayedAct {
     /// When it began.
     pub(crate) at: Instant,
     /// Its place in the case.
@@ -37,7 +37,7 @@ pub(crate) fn play(setup: &Setup, case: &TelegramTalk) -> TelegramsSeen {
     for (number, act) in case.acts.iter().enumerate() {
         for _ in 0..act.times {
             let sent = counts.outgoing(&act.what);
-            done.push(Done {
+            done.push(PlayedAct {
                 at: bench.now(),
                 act: number,
                 sent: sent.clone(),
@@ -52,7 +52,7 @@ pub(crate) fn play(setup: &Setup, case: &TelegramTalk) -> TelegramsSeen {
     pass(&mut bench, TAIL);
     let slaves = said(&bench.trace(0)).into_iter();
     TelegramsSeen {
-        said: slaves.filter(|own| own.from.is_some()).collect(),
+        said: slaves.filter(|telegram| telegram.from.is_some()).collect(),
         done,
         took: bench.now().since(Instant::START),
     }
@@ -75,7 +75,7 @@ fn send(bench: &mut Bench, setup: &Setup, sent: OutgoingTelegram) {
 
 /// What an act does to a slave from outside its bus.
 fn suffer(bench: &mut Bench, what: &TelegramActKind) {
-    let outside = |slave, own| PlacedFault::Stimulus(slave, AnyStimulus::Nordac(own));
+    let outside = |slave, stimulus| PlacedFault::Stimulus(slave, AnyStimulus::Nordac(stimulus));
     let faults = match *what {
         TelegramActKind::Link { slave, found } => vec![outside(slave, Stimulus::Link(found))],
         TelegramActKind::Fault { slave, number, on } => {
@@ -83,7 +83,7 @@ fn suffer(bench: &mut Bench, what: &TelegramActKind) {
         }
         TelegramActKind::Restart { slave } => {
             let both = [DriveFault::Off, DriveFault::On];
-            both.map(|own| PlacedFault::Drive(slave, own)).to_vec()
+            both.map(|fault| PlacedFault::Drive(slave, fault)).to_vec()
         }
         TelegramActKind::Ask(_) | TelegramActKind::Octets { .. } => Vec::new(),
     };

@@ -22,7 +22,7 @@ pub(super) fn read(wire: Wire, task: Pkw) -> [TelegramAct; 2] {
     [asks, wire.exchange(words, Pkw::default())]
 }
 
-/// A change, and a request of the same parameter behind it.
+/// A change, and a request of the same parameter after it.
 pub(super) fn change_and_read(wire: Wire, task: Pkw) -> Vec<TelegramAct> {
     let is_array = task.task().is_array();
     let again = Pkw::of(if is_array { 6 } else { 1 }, task.number(), task.ind, 0);
@@ -43,7 +43,7 @@ fn parameter(of_the_bus: bool, dice: &mut Dice) -> Option<&'static Parameter> {
     } else {
         dice.pick(&PARAMETERS)
     };
-    known.filter(|own| !OF_THE_BUS.contains(&own.number))
+    known.filter(|parameter| !OF_THE_BUS.contains(&parameter.number))
 }
 
 /// IND for a set and an element that the parameter has, or just not.
@@ -52,11 +52,11 @@ fn index(parameter: &Parameter, dice: &mut Dice) -> u16 {
         element: dice.below(usize::from(parameter.count) + 1) as u16,
         set: dice.below(usize::from(parameter.sets())) as u8,
     };
-    let own = index.ind(parameter);
+    let ind = index.ind(parameter);
     match dice.below(20) {
-        0 => own | u16::from(dice.byte()),
+        0 => ind | u16::from(dice.byte()),
         1 => dice.word(),
-        _ => own,
+        _ => ind,
     }
 }
 
@@ -83,7 +83,7 @@ pub(super) fn changing(of_the_bus: bool, dice: &mut Dice) -> Pkw {
     let Some(parameter) = parameter(of_the_bus, dice) else {
         return reading(dice);
     };
-    let usual = |number: u16| Parameter::of(number).map_or(0, |own| own.default.into());
+    let usual = |number: u16| Parameter::of(number).map_or(0, |parameter| parameter.default.into());
     let (least, most) = parameter.limits(usual);
     let number = match dice.below(9) {
         0 => least,

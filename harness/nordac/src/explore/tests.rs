@@ -11,7 +11,7 @@ use std::path::Path;
 
 fn trial(ppo: PpoType, header: &[&str]) -> EngineTrial<Nordac> {
     EngineTrial {
-        header: header.iter().map(|own| (*own).to_owned()).collect(),
+        header: header.iter().map(|line| (*line).to_owned()).collect(),
         drive: 8,
         station: (8, ppo),
     }
@@ -37,21 +37,21 @@ fn open_points() -> Vec<Vec<String>> {
     let mut all = vec![Vec::new()];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(|own| (*own).to_owned()).collect(),
+            Accepts::Words(words) => words.iter().skip(1).map(ToString::to_string).collect(),
             Accepts::Count {
                 least,
                 default,
                 most,
             } => [least, default - 1, default + 1, most]
                 .iter()
-                .filter(|own| **own != default && (least..=most).contains(*own))
+                .filter(|count| **count != default && (least..=most).contains(*count))
                 .map(u8::to_string)
                 .collect(),
         };
         all.extend(
             values
                 .iter()
-                .map(|own| vec![format!("slave 8 property {} = {own}", property.name)]),
+                .map(|value| vec![format!("slave 8 property {} = {value}", property.name)]),
         );
     }
     all
@@ -77,8 +77,9 @@ fn no_right_slave_is_accused() {
         "task-new-when",
     ];
     let mut lines = open_points();
-    lines.retain(|own| {
-        own.iter()
+    lines.retain(|values| {
+        values
+            .iter()
             .all(|line| some.iter().any(|name| line.contains(name)))
     });
     assert!(lines.len() > some.len());

@@ -2,7 +2,7 @@
 
 use super::act::{TelegramActKind, TelegramTalk};
 use super::hex;
-use super::play::{Done, TelegramsSeen};
+use super::play::{PlayedAct, TelegramsSeen};
 use harness_bench::capture::runs::HeardTelegram;
 use harness_proto::line::LineError;
 use harness_proto::time::{Instant, Span};
@@ -20,22 +20,22 @@ pub(super) fn steps(
     text: &mut String,
 ) {
     let mut replies = (1..).zip(&seen.said).peekable();
-    let ends = seen.done.iter().skip(1).map(|own| own.at);
+    let ends = seen.done.iter().skip(1).map(|done| done.at);
     let ends = ends.chain([Instant::NEVER]);
     for (done, end) in seen.done.iter().zip(ends) {
         act(case, done, text);
-        while let Some((number, own)) = replies.next_if(|(_, own)| own.at <= end) {
-            reply(own, (timed == Some(number)).then_some(octet), text);
+        while let Some((number, telegram)) = replies.next_if(|(_, telegram)| telegram.at <= end) {
+            reply(telegram, (timed == Some(number)).then_some(octet), text);
         }
     }
     // As long as the case: what is not asked for shows.
-    let ends = seen.done.iter().map(|own| own.at);
-    let last = ends.chain(seen.said.iter().map(|own| own.at)).max();
+    let ends = seen.done.iter().map(|done| done.at);
+    let last = ends.chain(seen.said.iter().map(|reply| reply.at)).max();
     let rest = (Instant::START + seen.took).since(last.unwrap_or(Instant::START));
     let _infallible = writeln!(text, "wait {}", time(Instant::START + rest));
 }
 
-fn act(case: &TelegramTalk, done: &Done, text: &mut String) {
+fn act(case: &TelegramTalk, done: &PlayedAct, text: &mut String) {
     let at = time(done.at);
     let _infallible = match (&done.sent, case.acts.get(done.act).map(|act| &act.what)) {
         (Some(sent), _) => {
@@ -69,19 +69,19 @@ fn harm(fault: LinkFault) -> String {
 }
 
 /// A reply; `timed` where it must come exactly at its time.
-fn reply(own: &HeardTelegram, timed: Option<Span>, text: &mut String) {
+fn reply(telegram: &HeardTelegram, timed: Option<Span>, text: &mut String) {
     let when = timed.map_or(String::new(), |octet| {
         // Where its first octet ends.
-        let first = own.at - octet * (own.octets.len() as u64 - 1);
+        let first = telegram.at - octet * (telegram.octets.len() as u64 - 1);
         format!("@{}..{} ", time(first - EXACT), time(first + EXACT))
     });
-    let bad = own
+    let bad = telegram
         .error
         .map_or(String::new(), |(place, error)| match error {
             LineError::Parity => format!(" bad {place}"),
             _ => format!(" bad {place} stop"),
         });
-    let _infallible = writeln!(text, "{when}< {}{bad}", hex::written(&own.octets));
+    let _infallible = writeln!(text, "{when}< {}{bad}", hex::written(&telegram.octets));
 }
 
 /// A time in milliseconds.

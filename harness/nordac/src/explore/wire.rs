@@ -65,12 +65,12 @@ impl Wire {
         min_tsdr: u8,
         group: u8,
     ) -> TelegramAct {
-        let mut own = SetPrm::lock(IDENT);
-        own.status |= bits;
-        own.watchdog = watchdog;
-        own.min_tsdr = min_tsdr;
-        own.group = group;
-        self.act(Service::SetPrm, &own.encode().unwrap_or_default())
+        let mut parameters = SetPrm::lock(IDENT);
+        parameters.status |= bits;
+        parameters.watchdog = watchdog;
+        parameters.min_tsdr = min_tsdr;
+        parameters.group = group;
+        self.act(Service::SetPrm, &parameters.encode().unwrap_or_default())
     }
 
     /// Chk_Cfg with the slave's own configuration.
