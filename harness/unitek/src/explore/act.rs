@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 /// A conversation of frames.
 pub(crate) type FrameTalk = LineTalk<Unitek>;
 
-/// An act of one.
+/// An act of a conversation.
 pub(crate) type FrameAct = LineAct<FrameActKind>;
 
 /// What can happen.
@@ -32,7 +32,6 @@ pub(crate) enum FrameActKind {
         drive: u8,
         /// One of [`Inputs::FORCED`].
         name: String,
-        /// The raw number.
         raw: Option<u32>,
     },
     /// A drive is switched off and on.
@@ -56,7 +55,7 @@ impl FrameActKind {
         let all = Inputs::SWITCHES.iter().chain(&Inputs::FORCED);
         match self {
             Self::Input { name, .. } | Self::Force { name, .. } => {
-                all.copied().find(|own| own == name)
+                all.copied().find(|known| known == name)
             }
             Self::Send(_) | Self::Restart { .. } => None,
         }

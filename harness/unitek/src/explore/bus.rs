@@ -104,7 +104,7 @@ impl LineBus for Unitek {
         }
     }
 
-    /// Shorter frames, and lower bytes behind the register.
+    /// Shorter frames, and lower bytes after the register.
     fn simpler(what: &FrameActKind) -> Vec<FrameActKind> {
         let FrameActKind::Send(frame) = what else {
             return Vec::new();
@@ -116,9 +116,9 @@ impl LineBus for Unitek {
         let mut all: Vec<_> = (0..data.len())
             .map(|length| data[..length].to_vec())
             .collect();
-        for (index, own) in data.iter().enumerate().skip(1) {
-            let lower = [0, 1, own & 0x0F, own / 2].into_iter();
-            for byte in lower.filter(|byte| byte < own) {
+        for (index, value) in data.iter().enumerate().skip(1) {
+            let lower = [0, 1, value & 0x0F, value / 2].into_iter();
+            for byte in lower.filter(|byte| byte < value) {
                 let mut other = data.to_vec();
                 other[index] = byte;
                 all.push(other);
@@ -163,7 +163,7 @@ impl LineBus for Unitek {
         let rate = port.map(|port| format!("rate {}", port.rate));
         let drives = port.map(axes).unwrap_or_default().into_iter();
         let drives =
-            drives.map(|own| format!("drive {} rx {:03X} tx {:03X}", own.node, own.rx, own.tx));
+            drives.map(|axis| format!("drive {} rx {:03X} tx {:03X}", axis.node, axis.rx, axis.tx));
         rate.into_iter().chain(drives).collect()
     }
 
@@ -173,15 +173,16 @@ impl LineBus for Unitek {
 
     fn plant(setup: &mut Setup, drive: u8, name: &str) -> Option<bool> {
         let known = DEVIATIONS.named(name)?;
-        let own = setup.drives.iter_mut().find(|own| own.node == drive);
-        Some(own.map(|own| own.deviation = Some(known)).is_some())
+        let mut drives = setup.drives.iter_mut();
+        let wrong = drives.find(|wrong| wrong.node == drive);
+        Some(wrong.map(|wrong| wrong.deviation = Some(known)).is_some())
     }
 
     fn model(setup: &Setup, properties: &[Properties]) -> Setup {
         let mut model = setup.clone();
-        for (drive, own) in model.drives.iter_mut().zip(properties) {
+        for (drive, values) in model.drives.iter_mut().zip(properties) {
             drive.deviation = None;
-            drive.properties = *own;
+            drive.properties = *values;
         }
         model
     }
@@ -198,8 +199,8 @@ impl LineBus for Unitek {
         oracle::begins(setup)
     }
 
-    fn neighbours(_: &Setup, _: usize, own: &Properties) -> Vec<Properties> {
-        oracle::neighbours(own).collect()
+    fn neighbours(_: &Setup, _: usize, properties: &Properties) -> Vec<Properties> {
+        oracle::neighbours(properties).collect()
     }
 
     fn lines(setup: &Setup, values: &[Properties]) -> Vec<String> {
@@ -223,8 +224,9 @@ impl LineBus for Unitek {
         oracle::difference(setup, place, plays, under)
     }
 
-    fn basis(own: &FrameDifference) -> (&str, &[String], bool) {
-        (&own.section, &own.under, own.what == FrameSymptom::Time)
+    fn basis(found: &FrameDifference) -> (&str, &[String], bool) {
+        let time = found.what == FrameSymptom::Time;
+        (&found.section, &found.under, time)
     }
 
     fn steps(
@@ -243,13 +245,13 @@ fn features(case: &FrameTalk, seen: &FramesSeen) -> Vec<u32> {
     let mut found = Vec::new();
     let mut before = 0;
     for act in &case.acts {
-        let own = kind(&act.what);
-        found.push(hash(&[1, before, own]));
+        let request = kind(&act.what);
+        found.push(hash(&[1, before, request]));
         if let FrameActKind::Send(frame) = &act.what {
             let register = frame.data().first().copied().unwrap_or(0);
-            found.push(hash(&[2, own, register.into()]));
+            found.push(hash(&[2, request, register.into()]));
         }
-        before = own;
+        before = request;
     }
     for frame in &seen.said {
         let data = frame.frame.data();

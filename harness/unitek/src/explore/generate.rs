@@ -8,7 +8,7 @@ use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request, Width};
 use harness_sim::unitek::Inputs;
 
-/// The longest time behind an act, in microseconds.
+/// The longest time after an act, in microseconds.
 pub(super) const LONGEST_WAIT: u64 = 2_000_000;
 
 /// Something that a conversation of frames can have.
@@ -43,7 +43,6 @@ pub(crate) enum FrameSpice {
 }
 
 impl FrameSpice {
-    /// All with their names.
     pub(crate) const NAMES: [(&'static str, Self); 13] = [
         ("read", Self::Read),
         ("write", Self::Write),
@@ -74,14 +73,13 @@ const TELLING: [u8; 18] = [
 /// Variables and ramps: they change nothing, or only how a motor turns.
 const VARIABLES: [u8; 8] = [0xD1, 0xD2, 0xD3, 0xD4, 0x35, 0xED, 0x34, 0x79];
 
-/// An act with a spice.
 pub(super) fn part(spice: FrameSpice, (node, rx): (u8, u16), dice: &mut Dice) -> Vec<FrameAct> {
     let what = match spice {
         FrameSpice::Inputs => outside(node, dice),
         FrameSpice::Power if dice.percent(25) => FrameActKind::Restart { drive: node },
         FrameSpice::Foreign => FrameActKind::Send(foreign(rx, dice)),
         FrameSpice::Lengths => FrameActKind::Send(of_length(rx, dice)),
-        own => match request(own, dice).encode(rx) {
+        spice => match request(spice, dice).encode(rx) {
             Ok(frame) => FrameActKind::Send(frame),
             Err(_) => FrameActKind::Restart { drive: node },
         },
@@ -92,7 +90,7 @@ pub(super) fn part(spice: FrameSpice, (node, rx): (u8, u16), dice: &mut Dice) ->
 /// Requests for some of what was written, and for what shows the drive's state.
 pub(super) fn close(
     acts: &[FrameAct],
-    (_, own): (u8, u16),
+    (_, rx): (u8, u16),
     drives: &[(u8, u16)],
     dice: &mut Dice,
 ) -> Vec<FrameAct> {
@@ -100,10 +98,10 @@ pub(super) fn close(
     asked.dedup();
     let shown: Vec<_> = asked
         .iter()
-        .filter_map(|(rx, own)| Some((*rx, shown_by(*own)?)))
+        .filter_map(|(rx, register)| Some((*rx, shown_by(*register)?)))
         .collect();
     asked.extend(shown);
-    asked.extend((0..2).filter_map(|_| Some((own, *dice.pick(&TELLING)?))));
+    asked.extend((0..2).filter_map(|_| Some((rx, *dice.pick(&TELLING)?))));
     let last = asked.split_off(asked.len().saturating_sub(6)).into_iter();
     let read = |(rx, register)| {
         let frame = Request::Read { register }.encode(rx).ok()?;
@@ -117,8 +115,8 @@ fn written(act: &FrameAct, drives: &[(u8, u16)]) -> Option<(u16, u8)> {
     let FrameActKind::Send(frame) = &act.what else {
         return None;
     };
-    let mut own = drives.iter().map(|(_, rx)| *rx);
-    let rx = own.find(|rx| u32::from(*rx) == frame.id().number())?;
+    let mut receivers = drives.iter().map(|(_, rx)| *rx);
+    let rx = receivers.find(|rx| u32::from(*rx) == frame.id().number())?;
     let register = *frame.data().first()?;
     (register != harness_proto::unitek::frame::READ).then_some((rx, register))
 }
@@ -194,9 +192,9 @@ fn request(spice: FrameSpice, dice: &mut Dice) -> Request {
         FrameSpice::WriteAny => {
             let writable: Vec<_> = REGISTERS
                 .iter()
-                .filter(|own| own.access != Access::FN && !matches!(own.number, 0x68 | 0x69))
+                .filter(|row| row.access != Access::FN && !matches!(row.number, 0x68 | 0x69))
                 .collect();
-            let register = dice.pick(&writable).map_or(0xD4, |own| own.number);
+            let register = dice.pick(&writable).map_or(0xD4, |row| row.number);
             let raw = value(dice);
             write(register, raw, dice)
         }
@@ -239,9 +237,9 @@ fn cycle(dice: &mut Dice) -> Request {
     let register = any_register(dice);
     match dice.below(10) {
         0 | 1 => Request::Stop { register },
-        own => Request::Cycle {
+        choice => Request::Cycle {
             register,
-            every: match own {
+            every: match choice {
                 2..=7 => 2 + dice.below(30) as u8,
                 _ => dice.byte().clamp(1, STOP - 1),
             },
@@ -295,8 +293,8 @@ fn foreign(rx: u16, dice: &mut Dice) -> Frame {
 
 /// A frame; one with no data where the identifier is none of 11 bits.
 fn frame(rx: u16, bytes: &[u8]) -> Frame {
-    let own = Frame::base(rx, bytes).or_else(|_| Frame::base(0x7FF, bytes));
-    own.unwrap_or_else(|_| unreachable!("7FF and at most 8 bytes fit"))
+    let frame = Frame::base(rx, bytes).or_else(|_| Frame::base(0x7FF, bytes));
+    frame.unwrap_or_else(|_| unreachable!("7FF and at most 8 bytes fit"))
 }
 
 fn outside(drive: u8, dice: &mut Dice) -> FrameActKind {
@@ -321,17 +319,16 @@ fn outside(drive: u8, dice: &mut Dice) -> FrameActKind {
     }
 }
 
-/// Another data byte.
 pub(super) fn change(what: &mut FrameActKind, dice: &mut Dice) {
-    let FrameActKind::Send(own) = what else {
+    let FrameActKind::Send(frame) = what else {
         return;
     };
-    if own.dlc() > 0 && !own.is_remote() {
-        let mut bytes = own.data().to_vec();
+    if frame.dlc() > 0 && !frame.is_remote() {
+        let mut bytes = frame.data().to_vec();
         let at = dice.below(bytes.len());
         bytes[at] = dice.byte();
-        if let Ok(frame) = Frame::new(own.id(), &bytes) {
-            *own = frame;
+        if let Ok(changed) = Frame::new(frame.id(), &bytes) {
+            *frame = changed;
         }
     }
 }

@@ -6,7 +6,7 @@ use harness_bench::explore::Dice;
 use harness_proto::unitek::words::MODE_EVENT;
 use harness_proto::unitek::{Data, Request};
 
-/// Microseconds behind an act within an idiom: enough for a reply.
+/// Microseconds after an act within an idiom: enough for a reply.
 const SHORT: u64 = 1_200;
 
 /// Writes `raw` with 16 bits.
@@ -29,7 +29,7 @@ const fn read(register: u8) -> Request {
     Request::Read { register }
 }
 
-/// An idiom of a spice with a drive, as requests and the milliseconds behind each; none for most spices.
+/// An idiom of a spice with a drive, as requests and the milliseconds after each; none for most spices.
 fn requests(spice: FrameSpice, dice: &mut Dice) -> Vec<(Request, u64)> {
     let level = dice.below(2) as u16;
     let (one, other) = (dice.word(), dice.word());

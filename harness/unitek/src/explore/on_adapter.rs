@@ -31,7 +31,7 @@ const BURST: usize = 16;
 
 /// What a run has to put right.
 #[derive(Debug)]
-pub(crate) struct Left {
+pub(crate) struct Leftovers {
     /// Registers with cycles that earlier cases may have left; all of them before the first case.
     cycles: Vec<u8>,
     /// What the drives held before the run, and what cases may have written.
@@ -40,41 +40,41 @@ pub(crate) struct Left {
 
 impl LineRig for Unitek {
     type Drives = UnitekDrives;
-    type Kept = Left;
+    type Kept = Leftovers;
 
     fn stations(rig: &Rig, _: Option<&Session>) -> Vec<(u8, u16)> {
         let drives = rig.port().map(axes).unwrap_or_default();
-        drives.iter().map(|own| (own.node, own.rx)).collect()
+        drives.iter().map(|axis| (axis.node, axis.rx)).collect()
     }
 
     fn lacks(rig: &Rig, allow_motion: bool, spice: FrameSpice) -> Option<&'static str> {
-        use FrameSpice as Own;
-        let own = limits(rig, allow_motion);
-        let motion = (own.motion, "allow_motion");
-        let eeprom = (own.eeprom, "allow_eeprom");
-        let bus_settings = (own.bus_settings, "allow_bus_settings");
+        use FrameSpice as Spice;
+        let limits = limits(rig, allow_motion);
+        let motion = (limits.motion, "allow_motion");
+        let eeprom = (limits.eeprom, "allow_eeprom");
+        let bus_settings = (limits.bus_settings, "allow_bus_settings");
         let needed: &[_] = match spice {
-            Own::Read | Own::Cycles | Own::Mode => &[],
-            Own::Write | Own::Motion | Own::Homing => &[motion],
-            Own::Settings => &[bus_settings],
-            Own::Eeprom => &[eeprom],
-            Own::WriteAny => &[motion, eeprom, bus_settings],
-            Own::Foreign => &[(own.other_identifiers, "allow_other_identifiers")],
-            Own::Lengths | Own::Inputs | Own::Power => return Some(ONLY_SIMULATED),
+            Spice::Read | Spice::Cycles | Spice::Mode => &[],
+            Spice::Write | Spice::Motion | Spice::Homing => &[motion],
+            Spice::Settings => &[bus_settings],
+            Spice::Eeprom => &[eeprom],
+            Spice::WriteAny => &[motion, eeprom, bus_settings],
+            Spice::Foreign => &[(limits.other_identifiers, "allow_other_identifiers")],
+            Spice::Lengths | Spice::Inputs | Spice::Power => return Some(ONLY_SIMULATED),
         };
-        needed.iter().find(|own| !own.0).map(|own| own.1)
+        needed.iter().find(|limit| !limit.0).map(|limit| limit.1)
     }
 
-    fn keep(session: &mut Session) -> Result<Left, ExploreError> {
+    fn keep(session: &mut Session) -> Result<Leftovers, ExploreError> {
         let before = HeldBefore::read(session);
         let before = before.map_err(|error| ExploreError::Lost(error.to_string()))?;
-        Ok(Left {
+        Ok(Leftovers {
             cycles: (0..=u8::MAX).collect(),
             before,
         })
     }
 
-    fn tidy(session: &mut Session, kept: &mut Left) {
+    fn tidy(session: &mut Session, kept: &mut Leftovers) {
         let mut frames = kept.before.reached_again();
         let registers = std::mem::take(&mut kept.cycles);
         for axis in session.axes().to_vec() {
@@ -91,7 +91,7 @@ impl LineRig for Unitek {
         }
     }
 
-    fn restore(session: &mut Session, kept: &mut Left) -> Vec<String> {
+    fn restore(session: &mut Session, kept: &mut Leftovers) -> Vec<String> {
         kept.before.set_back(session)
     }
 
@@ -109,7 +109,7 @@ impl LineRig for Unitek {
         })
     }
 
-    fn converse(session: &mut Session, kept: &mut Left, talk: &FrameTalk) -> Option<String> {
+    fn converse(session: &mut Session, kept: &mut Leftovers, talk: &FrameTalk) -> Option<String> {
         for act in &talk.acts {
             if let FrameActKind::Send(frame) = &act.what {
                 if let Some(&[0x3D, register, _]) = frame.data().first_chunk() {
@@ -124,9 +124,9 @@ impl LineRig for Unitek {
         None
     }
 
-    fn judged(session: &Session, _: &Left) -> (Option<FrameDifference>, bool) {
+    fn judged(session: &Session, _: &Leftovers) -> (Option<FrameDifference>, bool) {
         let trace = session.guarded().trace(0);
-        let frames = trace.channels.iter().flat_map(|own| own.frames());
+        let frames = trace.channels.iter().flat_map(|channel| channel.frames());
         let frames: Vec<LineFrame> = frames.copied().collect();
         let mut found = Vec::new();
         let mut waits = false;
@@ -136,15 +136,10 @@ impl LineRig for Unitek {
                 follower.hear(index + 1, frame);
             }
             waits |= follower.waits();
-            found.extend(
-                follower
-                    .end(frames.len(), &frames)
-                    .breaches
-                    .into_iter()
-                    .next(),
-            );
+            let judged = follower.end(frames.len(), &frames);
+            found.extend(judged.breaches.into_iter().next());
         }
-        let first = found.into_iter().min_by_key(|own| own.frame);
+        let first = found.into_iter().min_by_key(|breach| breach.frame);
         (first.map(FrameDifference::from), waits)
     }
 }
@@ -162,15 +157,15 @@ fn not_reached(frame: &Frame) -> Option<String> {
 }
 
 impl From<Breach> for FrameDifference {
-    fn from(own: Breach) -> Self {
+    fn from(breach: Breach) -> Self {
         Self {
-            what: own.what,
-            section: own.section.to_owned(),
-            register: own.register,
-            drive: Some(own.drive),
-            frame: own.frame,
+            what: breach.what,
+            section: breach.section.to_owned(),
+            register: breach.register,
+            drive: Some(breach.drive),
+            frame: breach.frame,
             under: Vec::new(),
-            about: own.about,
+            about: breach.about,
         }
     }
 }

@@ -16,19 +16,17 @@ use harness_proto::unitek::{Data, Register, Request};
 use harness_sim::record::LineFrame;
 use serde::{Deserialize, Serialize};
 
-/// Bits of the intermission behind a frame.
+/// Bits of the intermission after a frame.
 const INTERMISSION_BITS: u32 = 3;
 
 /// The first frame that no model explains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FrameDifference {
-    /// How it differs.
     pub(crate) what: FrameSymptom,
     /// The section, example, appendix item or dump that says most about it, such as `ex 9`.
     pub(crate) section: String,
     pub(crate) register: u8,
-    /// The drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) drive: Option<u8>,
     /// The number of the frame among those of the drives, counted from 1.
@@ -54,20 +52,20 @@ pub(super) fn begins(setup: &Setup) -> Vec<Vec<Properties>> {
         .map(|drive| measure(setup, drive))
         .collect();
     let all = |properties: Properties| {
-        let own = |measured: &Measured| Properties {
+        let properties = |measured: &Measured| Properties {
             stuff: measured.stuff,
             reply_delay: measured.reply_delay,
             homing_time: measured.homing_time,
             ..properties
         };
-        measured.iter().map(own).collect()
+        measured.iter().map(properties).collect()
     };
     vec![all(Properties::default()), all(Properties::fw472())]
 }
 
 /// All properties that differ in one open point.
-pub(super) fn neighbours(own: &Properties) -> impl Iterator<Item = Properties> {
-    let own = *own;
+pub(super) fn neighbours(properties: &Properties) -> impl Iterator<Item = Properties> {
+    let properties = *properties;
     let words = PROPERTIES
         .iter()
         .flat_map(|property| match property.accepts {
@@ -75,34 +73,35 @@ pub(super) fn neighbours(own: &Properties) -> impl Iterator<Item = Properties> {
             Accepts::Byte | Accepts::TimeUpTo(_) => Vec::new(),
         });
     words.filter_map(move |(property, word)| {
-        let mut new = own;
-        (property.set(&mut new, Setting::Word(word)) && new != own).then_some(new)
+        let mut new = properties;
+        (property.set(&mut new, Setting::Word(word)) && new != properties).then_some(new)
     })
 }
 
 /// The open points of an assignment as header lines, where they are not those of the profile `ds`.
 pub(super) fn lines(setup: &Setup, assignment: &[Properties]) -> Vec<String> {
     let mut lines = Vec::new();
-    for (drive, own) in setup.drives.iter().zip(assignment) {
+    for (drive, values) in setup.drives.iter().zip(assignment) {
         let node = drive.node;
         for property in PROPERTIES {
             if let Accepts::Words(words) = property.accepts {
                 let is = |word: &&&str| {
-                    let mut same = *own;
-                    property.set(&mut same, Setting::Word(word)) && same == *own
+                    let mut same = *values;
+                    property.set(&mut same, Setting::Word(word)) && same == *values
                 };
                 if let Some(word) = words.iter().skip(1).find(is) {
                     lines.push(format!("drive {node} property {} = {word}", property.name));
                 }
             }
         }
-        if own.stuff != 0 {
-            lines.push(format!("drive {node} property stuff = {:02X}", own.stuff));
+        if values.stuff != 0 {
+            let stuff = values.stuff;
+            lines.push(format!("drive {node} property stuff = {stuff:02X}"));
         }
         let usual = Properties::default();
         let times = [
-            ("reply-delay", own.reply_delay, usual.reply_delay),
-            ("homing-time", own.homing_time, usual.homing_time),
+            ("reply-delay", values.reply_delay, usual.reply_delay),
+            ("homing-time", values.homing_time, usual.homing_time),
         ];
         for (name, time, usual) in times {
             if time != usual {
@@ -128,17 +127,17 @@ fn meaning(frame: &Frame) -> &[u8] {
 }
 
 pub(super) fn same_frame(a: &Frame, b: &Frame) -> bool {
-    let head = |own: &Frame| (own.id(), own.is_remote(), own.dlc());
+    let head = |frame: &Frame| (frame.id(), frame.is_remote(), frame.dlc());
     head(a) == head(b) && meaning(a) == meaning(b)
 }
 
 /// How unlike two frames are.
 pub(super) fn unlike(a: &LineFrame, b: &LineFrame) -> i64 {
-    let (own, other) = (&a.frame, &b.frame);
-    let head = i64::from(own.id() != other.id()) + i64::from(own.is_remote() != other.is_remote());
-    let register = i64::from(own.data().first() != other.data().first());
-    let length = i64::from(own.dlc() != other.dlc());
-    let bits = meaning(own).iter().zip(meaning(other));
+    let (one, other) = (&a.frame, &b.frame);
+    let head = i64::from(one.id() != other.id()) + i64::from(one.is_remote() != other.is_remote());
+    let register = i64::from(one.data().first() != other.data().first());
+    let length = i64::from(one.dlc() != other.dlc());
+    let bits = meaning(one).iter().zip(meaning(other));
     let bits: u32 = bits.map(|(a, b)| (a ^ b).count_ones()).sum();
     let time = i64::from(a.start != b.start);
     1_000 * head + 1_000 * register + 100 * length + 2 * i64::from(bits) + time
@@ -164,10 +163,10 @@ pub(super) fn difference(
     let node = about_it.from;
     let register = about_it.frame.data().first().copied().unwrap_or(0);
     let known = Register::of(register);
-    let drive = node.filter(|node| setup.drives.iter().any(|own| own.node == *node));
-    let said = |own: Option<&LineFrame>| {
-        own.map_or("no frame".to_owned(), |own| {
-            format!("{} at {}", written(&own.frame), own.at)
+    let drive = node.filter(|node| setup.drives.iter().any(|drive| drive.node == *node));
+    let said = |frame: Option<&LineFrame>| {
+        frame.map_or("no frame".to_owned(), |frame| {
+            format!("{} at {}", written(&frame.frame), frame.at)
         })
     };
     let any = match under.is_empty() {
@@ -193,7 +192,7 @@ pub(super) fn difference(
 
 fn symptom(wanted: &LineFrame, came: &LineFrame) -> FrameSymptom {
     let (a, b) = (&wanted.frame, &came.frame);
-    let named = |own: &Frame| (own.id(), own.is_remote(), own.data().first().copied());
+    let named = |frame: &Frame| (frame.id(), frame.is_remote(), frame.data().first().copied());
     if same_frame(a, b) {
         FrameSymptom::Time
     } else if came.start < wanted.start {
@@ -227,12 +226,12 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
     };
     let firmware = said(vec![send(Request::Read { register: 0x1B }, 10_100_000)]);
     let reply = firmware.said.first();
-    let known = reply.and_then(|own| Some((own, Reply::decode(&own.frame, tx).ok()?)));
+    let known = reply.and_then(|frame| Some((frame, Reply::decode(&frame.frame, tx).ok()?)));
     let request = Request::Read { register: 0x1B }.encode(rx);
-    let asked = request.map_or(Span::ZERO, |own| alone.rate.time_of(own.wire_bits()));
-    // A reply that is ready within the intermission begins behind it; the delay counts from the end of the request.
-    let behind = known.map_or(Span::ZERO, |(own, _)| {
-        own.start.since(Instant::START + asked)
+    let asked = request.map_or(Span::ZERO, |frame| alone.rate.time_of(frame.wire_bits()));
+    // A reply that is ready within the intermission begins after it; the delay counts from the end of the request.
+    let behind = known.map_or(Span::ZERO, |(frame, _)| {
+        frame.start.since(Instant::START + asked)
     });
     let delay = match behind {
         Span::ZERO => Span::ZERO,
@@ -249,17 +248,18 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
         send(write(0x78, 1), 10_100_000),
     ]);
     let scan = Span::from_millis(1);
-    let ends = homed.said.iter().find(|own| {
-        let reply = Reply::decode(&own.frame, tx);
-        reply.is_ok_and(|own| own.register == 0x40 && own.data.bits() & status::CALIBRATED != 0)
+    let ends = homed.said.iter().find(|frame| {
+        let reply = Reply::decode(&frame.frame, tx);
+        let calibrated = |reply: Reply| reply.data.bits() & status::CALIBRATED != 0;
+        reply.is_ok_and(|reply| reply.register == 0x40 && calibrated(reply))
     });
     let begins = homed.done.last().map(|at| {
         let frame = write(0x78, 1).encode(rx);
-        *at + frame.map_or(Span::ZERO, |own| alone.rate.time_of(own.wire_bits()))
+        *at + frame.map_or(Span::ZERO, |frame| alone.rate.time_of(frame.wire_bits()))
     });
     let scans = |at: Instant| at.since_start().units() / scan.units();
     let homing_time = match (ends, begins) {
-        (Some(own), Some(begins)) => scan * scans(own.start).saturating_sub(scans(begins)),
+        (Some(end), Some(begins)) => scan * scans(end.start).saturating_sub(scans(begins)),
         _ => usual.homing_time,
     };
     Measured {

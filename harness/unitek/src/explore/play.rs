@@ -9,7 +9,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineFrame;
 use harness_sim::unitek;
 
-/// How long a case goes on behind its last act, for replies.
+/// How long a case goes on after its last act, for replies.
 const TAIL: Span = Span::from_millis(20);
 
 /// What a case has shown: frames of the drives, and when each act began.
@@ -33,8 +33,8 @@ pub(crate) fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
                     bench.inject(0, PlacedFault::Drive(*drive, fault), Moment::Now);
                 }
             }
-            own => {
-                if let Some((drive, stimulus)) = stimulus(own) {
+            input => {
+                if let Some((drive, stimulus)) = stimulus(input) {
                     let fault = PlacedFault::Stimulus(drive, AnyStimulus::Unitek(stimulus));
                     bench.inject(0, fault, Moment::Now);
                 }
@@ -46,7 +46,7 @@ pub(crate) fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
     let trace = bench.trace(0);
     let all = trace.channels.iter().flat_map(|channel| channel.frames());
     FramesSeen {
-        said: all.filter(|own| own.from.is_some()).copied().collect(),
+        said: all.filter(|frame| frame.from.is_some()).copied().collect(),
         done,
         took: bench.now().since(begin),
     }
@@ -64,7 +64,7 @@ fn stimulus(what: &FrameActKind) -> Option<(u8, unitek::Stimulus)> {
     }
 }
 
-/// Lets `wait` pass behind the present time, whatever happens.
+/// Lets `wait` pass after the present time, whatever happens.
 fn pass(bench: &mut Bench, wait: Span) {
     let until = bench.now() + wait;
     while bench.now() < until {

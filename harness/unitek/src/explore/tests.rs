@@ -24,7 +24,7 @@ fn right_drives() -> Vec<Vec<String>> {
     ];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(|own| (*own).to_owned()).collect(),
+            Accepts::Words(words) => words.iter().skip(1).map(ToString::to_string).collect(),
             Accepts::Byte => vec!["A5".to_owned()],
             Accepts::TimeUpTo(_) => ["1ms", "7ms", "137ms"].map(str::to_owned).to_vec(),
         };
@@ -33,12 +33,14 @@ fn right_drives() -> Vec<Vec<String>> {
     }
     // Several points at a time.
     for (first, second) in [(0, 3), (5, 9), (10, 16), (7, 15)] {
-        let two = [first, second].map(|own| &PROPERTIES[own]);
-        let line = |own: &&harness_proto::unitek::properties::Description| match own.accepts {
-            Accepts::Words(words) => Some(format!("drive 1 property {} = {}", own.name, words[1])),
+        let two = [first, second].map(|place| &PROPERTIES[place]);
+        let lines = two.iter().filter_map(|property| match property.accepts {
+            Accepts::Words(words) => {
+                Some(format!("drive 1 property {} = {}", property.name, words[1]))
+            }
             _ => None,
-        };
-        all.push(two.iter().filter_map(line).collect());
+        });
+        all.push(lines.collect());
     }
     all
 }

@@ -13,7 +13,7 @@ const TOLERANCE: Span = Span::from_micros(300);
 /// The same for a frame that is known to come at another time.
 const EXACT: Span = Span::from_micros(1);
 
-/// Frames up to this time behind a request need no time in a scenario.
+/// Frames up to this time after a request need no time in a scenario.
 const AT_ONCE: Span = Span::from_micros(1_500);
 
 /// The steps; the frame `timed`, counted from 1, must come exactly at its time.
@@ -21,8 +21,8 @@ pub(super) fn steps(case: &FrameTalk, seen: &FramesSeen, timed: Option<usize>, t
     let mut frames = (1..).zip(&seen.said).peekable();
     let mut last = Instant::START;
     for (act, at) in case.acts.iter().zip(&seen.done) {
-        while let Some((number, own)) = frames.next_if(|(_, own)| own.at <= *at) {
-            expect(own, (last, timed == Some(number)), text);
+        while let Some((number, frame)) = frames.next_if(|(_, frame)| frame.at <= *at) {
+            expect(frame, last, timed == Some(number), text);
         }
         let time = time(*at);
         let _infallible = match &act.what {
@@ -41,33 +41,34 @@ pub(super) fn steps(case: &FrameTalk, seen: &FramesSeen, timed: Option<usize>, t
             FrameActKind::Restart { drive } => writeln!(text, "@{time} drive {drive} restart"),
         };
     }
-    for (number, own) in frames {
-        expect(own, (last, timed == Some(number)), text);
+    for (number, frame) in frames {
+        expect(frame, last, timed == Some(number), text);
     }
     // As long as the case, and no longer: cycles may still run.
-    let ends = seen.done.iter().chain(seen.said.last().map(|own| &own.at));
+    let last = seen.said.last().map(|frame| &frame.at);
+    let ends = seen.done.iter().chain(last);
     let spoken = ends.max().copied().unwrap_or(Instant::START);
     let rest = (Instant::START + seen.took).since(spoken);
     let _infallible = writeln!(text, "wait {}", time(Instant::START + rest));
 }
 
 /// A frame of a drive, its stuff byte left open (UNITEK 4.1).
-fn expect(own: &LineFrame, (last, timed): (Instant, bool), text: &mut String) {
-    let mut frame = written(&own.frame);
-    if !own.frame.is_remote() && matches!(own.frame.dlc(), 4 | 6) {
-        frame.truncate(frame.len() - 2);
-        frame.push_str("xx");
+fn expect(frame: &LineFrame, last: Instant, timed: bool, text: &mut String) {
+    let mut shown = written(&frame.frame);
+    if !frame.frame.is_remote() && matches!(frame.frame.dlc(), 4 | 6) {
+        shown.truncate(shown.len() - 2);
+        shown.push_str("xx");
     }
     let tolerance = if timed { EXACT } else { TOLERANCE };
-    let _infallible = match own.at.since(last) <= AT_ONCE && !timed {
-        true => writeln!(text, "< {frame}"),
+    let _infallible = match frame.at.since(last) <= AT_ONCE && !timed {
+        true => writeln!(text, "< {shown}"),
         false => {
-            let from = Instant::START + own.at.since(Instant::START + tolerance);
+            let from = Instant::START + frame.at.since(Instant::START + tolerance);
             writeln!(
                 text,
-                "@{}..{} < {frame}",
+                "@{}..{} < {shown}",
                 time(from),
-                time(own.at + tolerance)
+                time(frame.at + tolerance)
             )
         }
     };
