@@ -12,10 +12,10 @@ use crate::scenario::verdict::Verdict;
 use include_dir::{Dir, File};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most deviations that are listed where several explain everything.
+/// Maximum number of deviations listed if several explain everything.
 const MOST_TOLD: usize = 8;
 
-/// What the names of conversations of a qualification begin with.
+/// The prefix of the names of a qualification's conversations.
 pub const CONVERSATION: &str = "qualify-";
 
 /// The conversations that are kept in a folder, in which what stands for a drive is `filled` in. `drive` is its name as the header of a scenario has
@@ -34,7 +34,7 @@ pub fn kept(folder: &Dir<'_>, drive: &str, filled: impl Fn(&str) -> String) -> V
     files.into_iter().filter_map(source).collect()
 }
 
-/// What a bus keeps of an attempt at a scenario, so that models can be compared with it.
+/// An attempt at a scenario, as a bus keeps it to compare models with it.
 pub trait Note {
     /// A known way in which a drive may be wrong.
     type Deviation: ?Sized + 'static;
@@ -44,34 +44,34 @@ pub trait Note {
     /// Its name, section and effect.
     fn words(deviation: &Self::Deviation) -> String;
 
-    /// What all buses keep of it.
+    /// The part that is the same for all buses.
     fn noted(&self) -> &AttemptSummary;
 
     /// Its drives, as the header of a scenario names them.
     fn drives(&self) -> Vec<String>;
 
-    /// Whether correct drives, with any value of what the manual leaves open, would have shown the same.
+    /// Whether right drives would have shown the same, with some values of what the manual leaves open.
     fn is_right(&self) -> bool;
 
-    /// Whether drives of which the one at this place has a deviation would have shown the same; `None` where that was not compared to its end.
+    /// Whether drives would have shown the same if the one at this place had a deviation; `None` if the comparison was not completed.
     fn explains(&self, place: usize, deviation: &'static Self::Deviation) -> Option<bool>;
 }
 
-/// What is kept of an attempt on any bus.
+/// An attempt, without what only its bus knows.
 #[derive(Clone, Debug)]
 pub struct AttemptSummary {
     pub name: String,
-    /// Its verdict; skipped where the drives were only asked for their registers.
+    /// The scenario's verdict; skipped if the drives were only asked for their registers.
     pub verdict: Verdict,
-    /// Whether the drives did something that no correct drive does, as far as is known.
+    /// Whether the drives did something that no right drive is known to do.
     pub accuses: bool,
-    /// Whether time is virtual, so that what came is compared with a model, whatever the verdict.
+    /// Whether time is virtual: then what came is compared with a model, whatever the verdict.
     pub exact: bool,
-    /// How many frames or telegrams were received.
+    /// Number of frames or telegrams received.
     pub received: usize,
-    /// Whether the drives became ready for the scenario, which was played then.
+    /// Whether the drives became ready and the scenario was played.
     pub was_ready: bool,
-    /// Whether they did not become ready.
+    /// Whether the drives did not become ready.
     pub was_unanswered: bool,
 }
 
@@ -82,7 +82,7 @@ impl AttemptSummary {
         self.was_ready || self.was_unanswered
     }
 
-    /// Whether it says nothing of the drives where it is played again.
+    /// Whether it shows nothing of the drives if the scenario is played again.
     fn showed_nothing(&self) -> bool {
         [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict) || self.was_unanswered
     }
@@ -91,11 +91,11 @@ impl AttemptSummary {
 /// The attempts of a qualification that were begun, in order.
 pub struct Attempts<'n, N> {
     notes: Vec<&'n N>,
-    /// Which of them another one speaks for.
+    /// For each note, whether another one speaks for it.
     spoken_for: Vec<bool>,
-    /// Which of them repeat what another part has played.
+    /// For each note, whether it repeats what another part has played.
     repeats: Vec<bool>,
-    /// What of the drives was walked and what was not, in lines; nothing where none is.
+    /// Lines that say what of the drives was walked and what was not; empty if nothing was.
     walks: String,
 }
 
@@ -137,7 +137,7 @@ impl<'n, N: Note> Attempts<'n, N> {
         all.collect()
     }
 
-    /// Each deviation that each drive may have, with the drive and its place.
+    /// Every deviation of every drive, with the drive's place and name.
     fn deviations(&self) -> Vec<(usize, String, &'static N::Deviation)> {
         let drives = self.notes.first().map_or(Vec::new(), |note| note.drives());
         let each = drives.into_iter().enumerate().flat_map(|(place, drive)| {
@@ -155,19 +155,19 @@ struct AttemptVerdict {
     accuses: bool,
     exact: bool,
     received: usize,
-    /// Whether another attempt speaks for it, or another part of the qualification has played the same conversation before with the same
-    /// verdict: it is judged, and not counted again.
+    /// Whether another attempt speaks for it, or an earlier part of the qualification has played the same conversation with the same
+    /// verdict. It is judged, but not counted.
     repeats: bool,
 }
 
-/// What the attempts say of the drives.
+/// What the attempts show of the drives.
 #[derive(Debug)]
 enum Diagnosis {
     /// No attempt accuses a drive.
     None,
     /// Drives did not become ready, and no deviation explains it.
     Unready,
-    /// These deviations explain all that was compared, in words.
+    /// The words of the deviations that explain all that was compared.
     Explained(Vec<String>),
 }
 
@@ -208,7 +208,7 @@ fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[AttemptVerdict]) -> Diagnos
     }
 }
 
-/// What a drive has shown of a point that the manual leaves open.
+/// A point that the manual leaves open, and what a drive has shown of it.
 pub struct Point<'p> {
     /// The drive, as the header of a scenario names it.
     pub drive: String,
@@ -242,8 +242,7 @@ fn agreed<'p>(parts: Vec<Vec<Point<'p>>>) -> (Vec<Point<'p>>, Vec<String>) {
     (points, contradictions)
 }
 
-/// Which attempts of the parts of a qualification, in order, repeat what a part before has played: they have the same name and
-/// the same verdict.
+/// For each attempt of these parts, in order, whether an earlier part has one with the same key.
 fn repeats<N, K: Ord>(parts: &[Vec<N>], of: impl Fn(&N) -> K) -> Vec<bool> {
     let mut before = BTreeSet::new();
     let mut all = Vec::new();
@@ -255,8 +254,8 @@ fn repeats<N, K: Ord>(parts: &[Vec<N>], of: impl Fn(&N) -> K) -> Vec<bool> {
     all
 }
 
-/// Which attempts are spoken for by another one of the same scenario: they `showed_nothing`, since the computer, the adapter or the line may have
-/// been the cause, and there is a later one, or one before it whose drives were `ready`. `of` gives the name, and both.
+/// For each attempt, whether another one of the same scenario speaks for it: it showed nothing, perhaps because of the computer, the adapter
+/// or the line, and there is a later one, or one whose drives were ready. `of` gives the name, whether it showed nothing, and was ready.
 fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool> {
     let attempts = notes.chunk_by(|one, next| of(one).0 == of(next).0);
     let spoken = attempts.flat_map(|attempts| {
@@ -270,15 +269,15 @@ fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool
     spoken.collect()
 }
 
-/// The profile of drives: every point that the manual leaves open, of each drive.
+/// The profile of drives, merged from all parts of a qualification.
 pub struct MergedProfile {
-    /// It; `None` where the drives were not asked.
+    /// `None` if the drives were not asked.
     profile: Option<Profile<ProfileLines>>,
     /// The contradictions between the parts of a qualification, in sentences.
     contradictions: Vec<String>,
 }
 
-/// The profile of the drives of a rig, by the points that each part of a qualification has shown; none where it has not asked the drives.
+/// Merges the points that each part of a qualification has shown into the profile of a rig's drives. A part without points has asked no drive.
 pub fn profile(rig: &Rig, began: &str, mut parts: Vec<Vec<Point<'_>>>) -> MergedProfile {
     parts.retain(|points| !points.is_empty());
     let asked = !parts.is_empty();
@@ -313,8 +312,8 @@ fn of_points(rig: &Rig, began: &str, points: Vec<Point<'_>>) -> Profile<ProfileL
     profile
 }
 
-/// What a qualification comes to. `frames` is the word for what is received, in the singular; `known` are the deviations that the rig's file
-/// names. `whole` if everything was played.
+/// The result of a qualification. `frames` is the singular noun for what is received, `known` are the deviations that the rig's file names,
+/// and `whole` says whether everything was played.
 pub fn qualified<N: Note>(
     all: &Attempts<'_, N>,
     profiled: MergedProfile,

@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A right drive as it is before the next input, behind the guard that judges what is sent to it.
 pub trait WalkModel: Clone {
-    /// By what its states differ.
+    /// What distinguishes its states.
     type State: Ord + Clone;
 
     fn state(&self) -> Self::State;
 
-    /// Whether an input means something in the state that it is in. One that does not makes no pair with the state.
+    /// Whether an input has a meaning in the present state. If not, the two are no pair that is walked.
     fn takes(&self, _input: usize) -> bool {
         true
     }
@@ -23,27 +23,27 @@ pub trait WalkModel: Clone {
     /// Sends an input, and asks the drive for what shows its effect: the lines of a scenario.
     ///
     /// # Errors
-    /// Why it is left out, such as what it needs in the rig's file. The model is of no more use.
+    /// Why the input is left out, such as what it needs in the rig's file. The model must not be used any more.
     fn put(&mut self, input: usize) -> Result<Vec<String>, String>;
 
-    /// Its time: it begins at the start of all times.
+    /// Its clock, which begins at [`Instant::START`].
     fn now(&self) -> Instant;
 }
 
-/// How long a walk may take.
+/// Maximum durations of a walk, in bus time.
 #[derive(Clone, Copy, Debug)]
 pub struct WalkBounds {
-    /// Each conversation; it ends with the input that goes beyond.
+    /// Of each conversation; it ends with the first input that exceeds this.
     pub conversation: Span,
-    /// All conversations together.
+    /// Of all conversations together.
     pub all: Span,
 }
 
-/// A conversation of a walk, which begins at its start.
+/// A conversation of a walk. It begins where the walk begins.
 #[derive(Debug)]
 pub struct WalkPart<S> {
     pub lines: Vec<String>,
-    /// Which inputs it puts for the first time, by state.
+    /// The pairs of a state and an input that it walks first.
     pub walked: BTreeSet<(S, usize)>,
 }
 
@@ -53,11 +53,11 @@ pub struct Walk<S> {
     pub parts: Vec<WalkPart<S>>,
     /// Pairs of a state and an input that are left out, by the reason.
     pub denied: BTreeMap<String, BTreeSet<(S, usize)>>,
-    /// Those that were not reached within the bounds.
+    /// Pairs that were not reached within the bounds.
     pub left: BTreeSet<(S, usize)>,
 }
 
-/// A walk of a model from where it stands with this number of inputs, to what none of these parts has walked.
+/// Walks a model from its present state with this number of inputs, to the pairs that none of the parts `before` has walked.
 pub fn walk<M: WalkModel>(
     start: &M,
     inputs: usize,
@@ -100,7 +100,7 @@ struct Walker<S> {
 }
 
 impl<S: Ord + Clone> Walker<S> {
-    /// One conversation; it walks nothing where nothing is left that can be reached.
+    /// Plans one conversation; it walks no pair if none can be reached any more.
     fn conversation<M: WalkModel<State = S>>(&mut self, model: &mut M, most: Span) -> WalkPart<S> {
         let mut part = WalkPart {
             lines: Vec::new(),
@@ -163,7 +163,7 @@ impl<S: Ord + Clone> Walker<S> {
         !self.walked.contains(&(state.clone(), input))
     }
 
-    /// The next input but these: a new one that leaves the state as it is, then any new one, then the first of the shortest way to one.
+    /// The next input that was not refused: a new one that keeps the state, then any new one, then the first of the shortest way to one.
     fn next(&self, here: &S, refused: &BTreeSet<usize>) -> Option<usize> {
         let ways = self.ways.get(here)?;
         let new = |stays: bool| {
@@ -178,7 +178,7 @@ impl<S: Ord + Clone> Walker<S> {
             .or_else(|| self.way(here, refused))
     }
 
-    /// The first input of the shortest way to a state in which an input is new; none of these.
+    /// The first input of the shortest way to a state in which an input is new; it was not refused.
     fn way(&self, here: &S, refused: &BTreeSet<usize>) -> Option<usize> {
         let mut seen = BTreeSet::from([here]);
         let mut reached = VecDeque::from([(here, None)]);
@@ -230,7 +230,7 @@ impl<S: Ord + Clone> Walker<S> {
 }
 
 impl<S: Ord> Walk<S> {
-    /// This walk, and after it another one, which began where more is permitted.
+    /// Appends the conversations of another walk, one with more permissions, and takes its left-out pairs.
     #[must_use]
     pub fn then(mut self, other: Self) -> Self {
         self.parts.extend(other.parts);
@@ -240,7 +240,7 @@ impl<S: Ord> Walk<S> {
         }
     }
 
-    /// This walk, and another one with other inputs, in conversations of its own.
+    /// Adds a walk with other inputs, in conversations of its own.
     #[must_use]
     pub fn beside(mut self, other: Self) -> Self {
         self.parts.extend(other.parts);

@@ -10,13 +10,13 @@ use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::hash::Hash;
 
-/// The most worlds at one time.
+/// Maximum number of worlds at one time.
 pub(crate) const MOST_WORLDS: usize = 4_096;
 
-/// Within this number of scans of what a drive does by itself shorter ones may show something else.
+/// Number of scans around a step of its own within which a drive with shorter scans might act differently.
 const SOON: i64 = 4;
 
-/// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
+/// A right drive on its own clock. It runs in scans: when a piece arrives within a scan makes no difference.
 pub trait RightDrive: Clone {
     /// A frame or a telegram.
     type Piece: Clone + Eq + Hash;
@@ -24,54 +24,54 @@ pub trait RightDrive: Clone {
     /// How long a scan lasts.
     const SCAN: Span;
 
-    /// Its clock may be off by this part of a time: 2 % (UNITEK 5.2).
+    /// The reciprocal of its clock's tolerance: 50 is 2 % (UNITEK 5.2).
     const DRIFT: i64 = 50;
 
     /// When it next does something by itself; `None` while it only waits for pieces.
     fn due(&self) -> Option<Instant>;
 
-    /// Whether it makes no difference how long it waits before that.
+    /// Whether the time that passes before [`Self::due`] makes no difference to it.
     fn rests(&self) -> bool {
         false
     }
 
-    /// Runs up to this time and including it.
+    /// Runs up to and including this time.
     fn advance(&mut self, to: Instant);
 
-    /// A piece reaches it. It has been run up to this time.
+    /// Takes a piece. The drive has been run up to this time.
     fn hear(&mut self, at: Instant, piece: &Self::Piece);
 
-    /// The drive that a piece has reached in parts, where a stream may part it.
+    /// The drive after a piece that arrived in parts; `None` where a stream does not part it.
     fn hear_parted(&self, _at: Instant, _piece: &Self::Piece) -> Option<Self> {
         None
     }
 
-    /// Takes the next piece that it sends now.
+    /// Returns the next piece that it sends at the present time.
     fn say(&mut self) -> Option<Self::Piece>;
 
-    /// Whether the last piece that was taken may leave later than what the drive says by itself after it.
+    /// Whether the last piece that it said may leave later than pieces that it says by itself after it.
     fn may_wait(&self) -> bool {
         false
     }
 
-    /// Whether what it says can be what came: the same but for what means nothing, and within the band of what moves.
+    /// Whether what came can be what it said: equal except for bits without a meaning, and within the band of a value that moves.
     fn is(&self, said: &Self::Piece, came: &Self::Piece) -> bool;
 
-    /// Whether what came is no piece, but what a line has left of one.
+    /// Whether what came is the rest of a piece that the line has damaged.
     fn is_damaged(_came: &Self::Piece) -> bool {
         false
     }
 
-    /// Whether what it does from now on is known. Where it is not, anything can come of it.
+    /// Whether its further behaviour is known. If it is not, the drive may send anything.
     fn knows(&self) -> bool {
         true
     }
 
-    /// A checksum of all that decides what it does from now on. Times in it count from the present.
+    /// A checksum of all that decides its further behaviour. Times in it count from the present.
     fn state(&self) -> u64;
 }
 
-/// A piece and when it can have been on the bus, on the computer's clock.
+/// A piece and the interval in which it was on the bus, on the computer's clock.
 #[derive(Clone, Debug)]
 pub struct TimedPiece<P> {
     pub earliest: Instant,
@@ -79,17 +79,17 @@ pub struct TimedPiece<P> {
     pub piece: P,
 }
 
-/// What a set of worlds says of a conversation.
+/// The judgement of a set of worlds on a conversation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Judged<P> {
     /// A right drive could have sent this.
     Right,
-    /// No right drive could: the place of the first piece that it would not have sent, which is after the last one where a piece is
-    /// missing; and what the last world would have sent.
+    /// No right drive could: the place of the first piece that none would have sent, one past the end where a piece is missing; and the
+    /// piece that the last world would have sent.
     Wrong(usize, Option<P>),
-    /// There are more worlds than are kept.
+    /// There are more worlds or steps than the limits allow.
     TooMany,
-    /// A world is left of which nothing more is known.
+    /// The further behaviour of a world that is left is not known.
     Unknown,
 }
 
@@ -100,55 +100,54 @@ pub struct Dialogue<P> {
     pub sent: Vec<TimedPiece<P>>,
     /// What came from it, in order.
     pub came: Vec<TimedPiece<P>>,
-    /// How many pieces had been sent when each that came was read: it is no answer to later ones. Empty where that is not known.
+    /// Number of pieces sent before each one that came was read: it answers no later one. Empty if not known.
     pub asked: Vec<usize>,
-    /// Up to when all that came was read.
+    /// The time up to which everything that came was read.
     pub end: Instant,
-    /// How much later than a right drive says it a piece may be on the bus.
+    /// Longest time between a right drive saying a piece and the piece on the bus.
     pub lag: Span,
-    /// Whether a piece that may wait may be overtaken.
+    /// Whether a later piece may overtake one that may wait.
     pub overtakes: bool,
-    /// Whether all that was said has come, so that nothing is on its way any more.
+    /// Whether all that was said has come, and nothing is still on its way.
     pub complete: bool,
-    /// The most pieces that the drive said and an adapter has lost.
+    /// Maximum number of the drive's pieces that an adapter has lost.
     pub most_lost: usize,
-    /// Whether pieces that were sent are lost as well.
+    /// Whether pieces to the drive may be lost as well.
     pub loses_sent: bool,
-    /// The most steps of all worlds together.
+    /// Maximum number of steps of all worlds together.
     pub most_steps: usize,
 }
 
-/// One right drive.
+/// One right drive, and what it would have sent.
 #[derive(Clone, Debug)]
 struct World<M: RightDrive> {
     model: M,
-    /// Its own clock.
+    /// The drive's clock, in units of a [`Span`].
     at: i64,
-    /// How far the computer's clock is ahead of it.
+    /// The least and the most by which the computer's clock is ahead of it.
     ahead: (i64, i64),
-    /// How many of the pieces that were sent have reached it.
+    /// Number of sent pieces that have reached it.
     heard: usize,
-    /// When it did something by itself for the last time.
+    /// When it last did something by itself.
     stirred: i64,
-    /// What it has said that has not come so far.
+    /// Pieces that it has said and that have not come yet.
     said: VecDeque<DrivePiece<M::Piece>>,
-    /// The places of the pieces that were lost or whose answers were, in what was sent.
+    /// The places, in what was sent, of the pieces that were lost or whose answers were.
     lost: Vec<usize>,
 }
 
 /// A piece that a world has said.
 #[derive(Clone, Debug)]
 struct DrivePiece<P> {
-    /// When, on its own clock.
+    /// On the drive's clock.
     at: i64,
-    /// How many pieces it had heard.
+    /// Number of pieces that it had heard.
     heard: usize,
     piece: P,
     may_wait: bool,
 }
 
-/// Worlds that have heard and lost the same number of pieces, are in the same state and have said the same, as long ago, do the same from now
-/// on.
+/// Numbers of pieces heard and lost, state, and what was said how long ago: worlds with equal keys behave the same from now on.
 type MergeKey<P> = (usize, usize, u64, Vec<(i64, P)>);
 
 impl<M: RightDrive> World<M> {
@@ -159,7 +158,7 @@ impl<M: RightDrive> World<M> {
         (self.heard, lost, self.model.state(), said.collect())
     }
 
-    /// The world in which the piece that is next to come is lost; `None` where nothing is said, or where `most` are lost.
+    /// The world in which the next piece to come is lost; `None` if nothing was said, or if `most` are lost.
     fn losing(&self, most: usize) -> Option<Self> {
         let said = self.said.front().filter(|_| self.lost.len() < most)?;
         let lost = said.heard.saturating_sub(1);
@@ -169,20 +168,20 @@ impl<M: RightDrive> World<M> {
         Some(world)
     }
 
-    /// The world in which the line has added something: the answer to the last piece counts as lost.
+    /// The world after something that the line itself has added: the answer to the last piece counts as lost.
     fn adding(&self) -> Self {
         let mut world = self.clone();
         world.lost.push(world.heard.saturating_sub(1));
         world
     }
 
-    /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
+    /// The world with the difference of the clocks narrowed to `least..=most`; `None` if none is left.
     fn within(mut self, least: i64, most: i64) -> Option<Self> {
         self.ahead = (self.ahead.0.max(least), self.ahead.1.min(most));
         (self.ahead.0 <= self.ahead.1).then_some(self)
     }
 
-    /// The world that has waited, its own clock like that of the computer, until what can reach it between these times.
+    /// The world that has waited for a piece that can reach it between these times of the computer's clock.
     fn waiting(&self, earliest: i64, latest: i64) -> Option<Self> {
         let (scan, begun) = (units_of(M::SCAN), earliest.max(self.at + self.ahead.0));
         let mut world = self.clone();
@@ -192,8 +191,8 @@ impl<M: RightDrive> World<M> {
         world.within(i64::MIN, i64::MAX)
     }
 
-    /// Takes another world in that does the same, at another time of its own clock. Returns whether the times of both are one interval: where
-    /// they are not, and where times count, it stays as it is.
+    /// Merges another world that behaves the same into this one. Returns false, and changes nothing, if the intervals of both are apart and the
+    /// drive waits for a time.
     fn merge(&mut self, other: &Self) -> bool {
         let moved = other.at - self.at;
         let (least, most) = (other.ahead.0 + moved, other.ahead.1 + moved);
@@ -206,7 +205,7 @@ impl<M: RightDrive> World<M> {
         true
     }
 
-    /// Whether it does something by itself within a few scans, or moves.
+    /// Whether a step of its own is at most [`SOON`] scans away, or it moves.
     fn stirs(&self) -> bool {
         let near = units_of(M::SCAN) * SOON;
         let due = self.model.due().map(units);
@@ -245,13 +244,13 @@ fn instant(at: i64) -> Instant {
     Instant::START + Span::from_units(at.unsigned_abs())
 }
 
-/// The place of a world: how many pieces it has heard, when, and its number.
+/// The place of a world: number of pieces heard, the drive's clock, and a serial number.
 type Place = (usize, i64, usize);
 
-/// Worlds of which no two do the same, the earliest first: what follows from one comes after it.
+/// Worlds of which no two behave the same, in order of their places. What follows from a world has a later place.
 struct Worlds<M: RightDrive> {
     all: BTreeMap<Place, World<M>>,
-    /// Where those stand that do the same. A place at which none stands any more stays.
+    /// The places of worlds that behave the same. The place of a world that was taken out stays.
     same: HashMap<MergeKey<M::Piece>, Vec<Place>>,
     numbers: usize,
 }
@@ -282,13 +281,13 @@ impl<M: RightDrive> Worlds<M> {
     }
 }
 
-/// Whether one of these right drives, which have just been made and whose clocks begin with that of the conversation, could have sent
-/// what came. What the first one says stands for all where none could.
+/// Whether one of these right drives could have sent what came. They are fresh, and their clocks begin with that of the conversation. If none
+/// could, the judgement is that on the first one.
 pub fn judge<M: RightDrive>(drives: Vec<M>, talk: &Dialogue<M::Piece>) -> Judged<M::Piece> {
     judge_alive(drives, talk, &|| ())
 }
 
-/// The same where `alive` is called now and then, since it may take seconds.
+/// As [`judge`]; calls `alive` again and again, since it may take seconds.
 pub fn judge_alive<M: RightDrive>(
     drives: Vec<M>,
     talk: &Dialogue<M::Piece>,
@@ -308,11 +307,11 @@ pub fn judge_alive<M: RightDrive>(
     first.unwrap_or(Judged::Unknown)
 }
 
-/// The places, in what was sent, of the pieces that were lost or whose answers were, where a right drive could have sent what came: as few as
-/// explain it.
+/// The places, in what was sent, of the pieces that were lost or whose answers were: the fewest with which a right drive could have sent what
+/// came.
 ///
 /// # Errors
-/// What else is said of the conversation, and whether a world did something by itself then: within shorter scans it might have done other things.
+/// The judgement if no right drive could, and whether a world was near a step of its own: with shorter scans it might have acted differently.
 pub fn lost<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
@@ -332,7 +331,7 @@ pub fn lost<M: RightDrive>(
     lost_in(model, talk, HearingTime::AtAnyTime, alive)
 }
 
-/// When a drive hears a piece, in the worlds that are tried.
+/// The times at which the worlds that are tried hear a piece.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum HearingTime {
     /// At one time.
@@ -355,7 +354,7 @@ impl HearingTime {
     }
 }
 
-/// The same in some of the worlds.
+/// As [`lost`], in worlds that hear pieces at these times.
 fn lost_in<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
@@ -449,7 +448,7 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         false
     }
 
-    /// Where what a world has said is what came at a place, the world after it. Returns whether it can do nothing else before that.
+    /// Gives `explained` the world after what came at a place, if the world has said it. Returns whether the world can do nothing else first.
     fn say<M: RightDrive<Piece = P>>(
         &self,
         world: &World<M>,
@@ -485,8 +484,8 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         false
     }
 
-    /// What a world can do next: hear what was sent at one time or another, or do its next step. At the end of
-    /// the conversation it may have done its last one.
+    /// The worlds that can come next: those that hear the next piece, at each time at which it can reach the drive, and the one that does its
+    /// next step. `ended` gets the world if it may have done its last one.
     fn next<M: RightDrive<Piece = P>>(
         &self,
         world: World<M>,
