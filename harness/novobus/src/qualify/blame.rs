@@ -95,7 +95,7 @@ impl Sighting {
         let answered: Vec<usize> = answered.map(|(index, _)| index).collect();
         let received = &attempt[place].received;
         // Bytes that nobody asked for answer none that was sent. Behind a check sequence that ends them every byte has come back.
-        let unasked = match compared.is_behind_a_race(found) {
+        let unasked = match compared.is_after_a_race(found) {
             true => received.len().checked_sub(answered.len())?,
             false => 0,
         };

@@ -49,7 +49,7 @@ pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
             match compare(&all, facts) {
                 // It moves the model's bytes so that they seem to be late, and explains nothing.
                 Ok(comparisons)
-                    if silence(&comparisons).is_some_and(|silence| !silence.is_behind(&first))
+                    if silence(&comparisons).is_some_and(|silence| !silence.is_after(&first))
                         || compared(&comparisons) < first.compared => {}
                 Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
@@ -63,7 +63,7 @@ pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
                         time_outs: time_outs && choice.property == TIME_OUT,
                     });
                 }
-                Err((place, _)) if further.is_none() && place.is_behind(&first) => {
+                Err((place, _)) if further.is_none() && place.is_after(&first) => {
                     further = Some((place, format!("{choice}{whose}"), all, choice.property));
                 }
                 Err(_) => {}
@@ -89,7 +89,7 @@ struct FirstDifference {
 }
 
 impl FirstDifference {
-    fn is_behind(&self, other: &Self) -> bool {
+    fn is_after(&self, other: &Self) -> bool {
         let byte = |place: &Self| place.divergence.as_ref().map(|found| found.byte);
         let place = |place: &Self| (place.conversation, byte(place));
         place(self) > place(other)

@@ -7,7 +7,7 @@ use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::places::{answered, collapsed, heard, known_places, what_of};
 use super::rows::{Rows, answer_of};
-use super::unasked::{SentTimes, behind_a_race};
+use super::unasked::{SentTimes, after_a_race};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
 use harness_proto::nd21::{own, ram};
@@ -147,7 +147,7 @@ impl Comparer<'_> {
                 if race.is_none() {
                     continue;
                 }
-                self.behind_a_race(before, ring, size, conversation, answer);
+                self.after_a_race(before, ring, size, conversation, answer);
                 return;
             };
             let role = rows.role(index);
@@ -193,9 +193,9 @@ impl Comparer<'_> {
                 return;
             }
             if self.comparison.divergence.is_none() {
-                let behind = |from| found.received.is_none_or(|(at, _)| at >= from);
+                let after = |from| found.received.is_none_or(|(at, _)| at >= from);
                 let excused = real_time.then(|| excused(index)).flatten();
-                self.comparison.silenced = excused.is_some_and(behind);
+                self.comparison.silenced = excused.is_some_and(after);
                 self.comparison.divergence = Some(found);
             }
             return;
@@ -208,7 +208,7 @@ impl Comparer<'_> {
     }
 
     /// Compares what comes after a check sequence that ends a race of clocks, if one does.
-    fn behind_a_race(
+    fn after_a_race(
         &mut self,
         before: usize,
         ring: usize,
@@ -222,7 +222,7 @@ impl Comparer<'_> {
         let does = |monitors: &Option<bool>| *monitors == Some(true);
         let alone = self.monitoring(ring, size).filter(does).count() == 1;
         let tolerance = self.exactness.tolerance;
-        let rest = behind_a_race(conversation, ring, size, answer, tolerance, alone);
+        let rest = after_a_race(conversation, ring, size, answer, tolerance, alone);
         if let Some((conversation, answer, left)) = rest {
             if let Some(race) = self.comparison.unasked.last_mut() {
                 race.until = conversation.received.first().map(|(_, at, _)| *at);
@@ -243,8 +243,8 @@ impl Comparer<'_> {
         };
         let drive = answering(first)?;
         let before = self.comparison.clone();
-        let behind = first + 1..rows.received.len();
-        let differing: Vec<_> = behind
+        let after = first + 1..rows.received.len();
+        let differing: Vec<_> = after
             .filter(|index| self.row(rows, *index, || None).is_some())
             .collect();
         self.comparison = before;

@@ -191,7 +191,7 @@ impl Comparison {
     }
 
     /// Whether a difference comes after a check sequence that ends such a race.
-    pub(crate) fn is_behind_a_race(&self, found: &Divergence) -> bool {
+    pub(crate) fn is_after_a_race(&self, found: &Divergence) -> bool {
         let at = found.received.map(|(at, _)| at);
         let ended = |race: &&UnaskedByte| race.ring == found.ring && race.until.is_some();
         self.unasked

@@ -294,7 +294,7 @@ mod tests {
     /// with all; one that does so with the time-out alone is right too.
     #[test]
     fn all_codes_of_the_bus_set_the_error_bit_or_none() {
-        let behind = |drive: &mut Drive, code: u16, bit: u8| {
+        let after = |drive: &mut Drive, code: u16, bit: u8| {
             drive.confirm();
             assert_eq!(drive.code(0, 0), [None, None]);
             assert_eq!(drive.code(code, code), [Some(true); 2]);
@@ -303,21 +303,21 @@ mod tests {
             drive.read(ram::STATUS, status::ERROR, bit)
         };
         let mut drive = Drive::default();
-        assert_eq!(behind(&mut drive, 0x0507, 0), None);
-        assert_eq!(behind(&mut drive, 0x0508, status::ERROR), None);
-        assert_eq!(behind(&mut drive, 0x0507, 0), None);
+        assert_eq!(after(&mut drive, 0x0507, 0), None);
+        assert_eq!(after(&mut drive, 0x0508, status::ERROR), None);
+        assert_eq!(after(&mut drive, 0x0507, 0), None);
         drive.0.begin();
         assert_eq!(drive.clone().read(ram::STATUS, 0, status::ERROR), None);
-        assert_eq!(behind(&mut drive, 0x0508, status::ERROR), None);
+        assert_eq!(after(&mut drive, 0x0508, status::ERROR), None);
         drive.confirm();
         drive.code(0, 0);
         drive.code(0x0504, 0x0504);
         assert_eq!(drive.read(ram::STATUS, 0, status::ERROR), Some(false));
         let mut drive = Drive::default();
-        assert_eq!(behind(&mut drive, 0x0507, status::ERROR), None);
+        assert_eq!(after(&mut drive, 0x0507, status::ERROR), None);
         drive.0.begin();
-        assert_eq!(behind(&mut drive, 0x0508, 0), Some(false));
-        assert_eq!(behind(&mut drive, 0x0507, status::ERROR), None);
-        assert_eq!(behind(&mut drive, 0x0504, 0), Some(false));
+        assert_eq!(after(&mut drive, 0x0508, 0), Some(false));
+        assert_eq!(after(&mut drive, 0x0507, status::ERROR), None);
+        assert_eq!(after(&mut drive, 0x0504, 0), Some(false));
     }
 }

@@ -47,8 +47,8 @@ impl Rows<'_> {
 
     /// Whether the model refuses the command of an answer, or is in the error mode: then 00 stands in the place of data too (ND21 9.7).
     pub(super) fn is_refused(&self, index: usize) -> bool {
-        let behind = self.expected.iter().skip(index).take(LONGEST_ANSWER);
-        if behind.clone().all(|(_, due)| due.byte == 0) {
+        let after = self.expected.iter().skip(index).take(LONGEST_ANSWER);
+        if after.clone().all(|(_, due)| due.byte == 0) {
             return true;
         }
         let sent = self.sent.iter().take(index + 1).chain(&[SYNCO]);

@@ -190,8 +190,8 @@ impl SentTimes<'_> {
             if !same(index) {
                 (differs, ended) = (true, false);
             }
-            let behind = received[index..].iter().map(|heard| heard.1);
-            let whole = behind.take(sequence.len()).eq(sequence);
+            let after = received[index..].iter().map(|heard| heard.1);
+            let whole = after.take(sequence.len()).eq(sequence);
             ended |= whole && (index..index + sequence.len()).all(same);
             if in_error_mode[index] && differs && !ended && begins(&index) {
                 first = Some(index);
@@ -264,7 +264,7 @@ impl SentTimes<'_> {
     /// return of the byte before it to the start of the next one, and [`PUNCTUAL`] bytes that come back as they were sent, none before its
     /// time, show that the next one started when the bench says.
     fn is_overdue(&self, received: &[TimedByte], first: usize) -> bool {
-        let behind = || {
+        let after = || {
             let before = first.checked_sub(1)?;
             let start = self.answered.get(before)?;
             let next = self.all.partition_point(|at| at <= start);
@@ -281,14 +281,14 @@ impl SentTimes<'_> {
             let is_zero = came[0].1 == Received::good(0);
             Some(silence > LATEST_TIME_OUT + CLOCKS && is_so && !is_zero)
         };
-        behind() == Some(true)
+        after() == Some(true)
     }
 }
 
 /// What was sent and received after a check sequence that ends a race (ND21 9.8), what the twin received there, and how many bytes came
 /// before. `None` where it is not certain that the drives are as their models again: the master has sent something else than zeros and SYNCO
 /// in front of it, the sequence or a byte after it is not in its place, or a drive that monitors may not have missed its master.
-pub(super) fn behind_a_race(
+pub(super) fn after_a_race(
     conversation: &Conversation,
     ring: usize,
     size: RingSize,
@@ -309,11 +309,11 @@ pub(super) fn behind_a_race(
     if !(all_missed || one_monitors) || conversation.done.iter().any(fault) {
         return None;
     }
-    let behind: Vec<u8> = sent[last + 1..].iter().map(|(byte, _)| *byte).collect();
-    let place = behind
+    let after: Vec<u8> = sent[last + 1..].iter().map(|(byte, _)| *byte).collect();
+    let place = after
         .windows(SEQUENCE.len())
         .position(|window| window == SEQUENCE)?;
-    if !behind[..place].iter().all(|byte| [0, SYNCO].contains(byte)) {
+    if !after[..place].iter().all(|byte| [0, SYNCO].contains(byte)) {
         return None;
     }
     // A drive that alone monitors has missed its bytes after the longest silence in front of the sequence, too.
@@ -325,16 +325,16 @@ pub(super) fn behind_a_race(
     let answered = answered(size, &sent[end..]).0.len();
     // Each byte after the sequence has come back, and the sequence in front of them.
     let received = conversation.received_in(ring);
-    let behind_the_sequence = |heard: &[TimedByte]| {
+    let after_the_sequence = |heard: &[TimedByte]| {
         let from = heard.len().checked_sub(answered)?;
         let values: Vec<_> = heard[..from].iter().map(|(_, byte)| *byte).collect();
         values
             .ends_with(&SEQUENCE.map(Received::good))
             .then_some(from)
     };
-    let left = behind_the_sequence(&received)?;
+    let left = after_the_sequence(&received)?;
     let rest = TwinBytes {
-        bytes: answer.bytes[behind_the_sequence(&answer.bytes)?..].to_vec(),
+        bytes: answer.bytes[after_the_sequence(&answer.bytes)?..].to_vec(),
         unasked: None,
     };
     let mut places = 0..;

@@ -230,10 +230,10 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
     let request = Request::Read { register: 0x1B }.encode(rx);
     let asked = request.map_or(Span::ZERO, |frame| alone.rate.time_of(frame.wire_bits()));
     // A reply that is ready within the intermission begins after it; the delay counts from the end of the request.
-    let behind = known.map_or(Span::ZERO, |(frame, _)| {
+    let after = known.map_or(Span::ZERO, |(frame, _)| {
         frame.start.since(Instant::START + asked)
     });
-    let delay = match behind {
+    let delay = match after {
         Span::ZERO => Span::ZERO,
         later => later + alone.rate.time_of(INTERMISSION_BITS),
     };

@@ -106,10 +106,10 @@ fn judged_with(
 }
 
 fn dialogue(sent: &[(u64, u8)], came: &[(u64, u8)], most_lost: usize) -> Dialogue<u8> {
-    let timed = |list: &[(u64, u8)], before, behind| -> Vec<_> {
+    let timed = |list: &[(u64, u8)], before, after| -> Vec<_> {
         let piece = |(at, piece): &(u64, u8)| TimedPiece {
             earliest: ms(at - before),
-            latest: ms(at + behind),
+            latest: ms(at + after),
             piece: *piece,
         };
         list.iter().map(piece).collect()
