@@ -21,14 +21,14 @@ use std::collections::BTreeSet;
 /// How much later than its model a drive may detect a time-out: after 20 ms instead of 10 (ND21 9.9).
 const TIME_OUT_RANGE: Span = Span::from_millis(10);
 
-/// What is compared, ring by ring.
+/// The comparison of a conversation, ring by ring.
 pub(crate) struct Comparer<'a> {
     pub(crate) exactness: Exactness,
     pub(crate) byte_time: Span,
     pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
     pub(crate) recording: BTreeSet<(usize, u8)>,
-    /// How long a drive that monitors hears nothing at least before it detects a time-out.
+    /// Shortest silence after which a drive that monitors detects a time-out.
     pub(crate) earliest_time_out: Span,
     /// As [`Conversation::unwatched`].
     pub(crate) unwatched: &'a [(Instant, Instant)],
@@ -47,7 +47,7 @@ impl Comparer<'_> {
         self.ring_from(0, ring, size, conversation, answer);
     }
 
-    /// The same of the last part of a conversation; `before` is the number of bytes received in front of it.
+    /// Compares the last part of a conversation; `before` is the number of bytes received before it.
     fn ring_from(
         &mut self,
         before: usize,
@@ -342,7 +342,7 @@ impl Comparer<'_> {
         }
     }
 
-    /// The checking byte of an answer is right.
+    /// Learns the zeros of an answer whose checking byte is right.
     fn learn_zeros<'r>(
         &mut self,
         ring: usize,

@@ -14,16 +14,15 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
-/// How much longer than its conversation a twin in real time listens. Real clocks are late at times, and bytes of the ring may arrive a
-/// moment before those of its twin.
+/// How long a twin in real time listens after its conversation: bytes of the ring may arrive a moment before those of its twin.
 const SLACK: Span = Span::from_millis(1);
 
-/// What the bench did to a ring.
+/// An act of the bench on a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Done {
-    /// It sent a byte, whose start bit was due at this time.
+    /// It sent a byte, with its start bit due at this time.
     Sent(Instant, u8),
-    /// It came to the step at this place of the scenario's text.
+    /// It reached the step at this place of the scenario's text.
     Step(usize),
     /// It injected a fault, at this time or at the given moment.
     Fault(Instant, PlacedFault, Moment),
@@ -32,13 +31,13 @@ pub(crate) enum Done {
 /// One conversation as the master's end of the rings saw it. Times are the conversation's own.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Conversation {
-    /// What the bench did, each with its ring, in order.
+    /// The acts of the bench, each with its ring, in order.
     pub done: Vec<(usize, Done)>,
-    /// Bytes received: ring, when, and the byte.
+    /// The bytes received: ring, time and byte.
     pub received: Vec<(usize, Instant, Received)>,
-    /// When the next conversation began, or when this one was over.
+    /// When the next conversation began, or this one was over.
     pub end: Instant,
-    /// When the bench did not look at its ports: what was read after that came at any time in it.
+    /// Intervals in which the bench did not look at its ports: a byte read at the end of one came at any time in it.
     pub unwatched: Vec<(Instant, Instant)>,
 }
 
@@ -98,7 +97,7 @@ impl Conversation {
         all
     }
 
-    /// The bytes sent into a ring, and whether they went round whole.
+    /// The bytes sent into a ring, each with whether it went round undamaged.
     pub(crate) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
         let mut damaged = BTreeSet::new();
         let mut sent = Vec::new();
@@ -146,7 +145,7 @@ impl Conversation {
         step
     }
 
-    /// Whether it is that of a scenario, and not of what comes before or after it.
+    /// Whether it is the scenario's own, and not one before or after it.
     #[must_use]
     pub(crate) fn has_steps(&self) -> bool {
         let step = |(_, done): &(usize, Done)| matches!(done, Done::Step(_));
@@ -167,7 +166,7 @@ impl Conversation {
 /// What a twin received from a ring in a conversation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwinBytes {
-    /// The bytes, and when each came.
+    /// The bytes, each with its time.
     pub(crate) bytes: Vec<(Instant, Received)>,
     /// The place of the first one that a drive sent unasked (ND21 9.9).
     pub(crate) unasked: Option<usize>,
@@ -194,7 +193,7 @@ pub(crate) struct Twin {
 }
 
 impl Twin {
-    /// A twin with these rings, which have just been switched on.
+    /// A twin with these rings, freshly switched on.
     #[must_use]
     pub(crate) fn new(link: SimulatedLink, sizes: &[RingSize]) -> Self {
         Self {
@@ -219,7 +218,7 @@ impl Twin {
         self.follow_rings(conversation, exactness, &BTreeSet::new())
     }
 
-    /// The same, but some rings are not compared.
+    /// As [`Self::follow`], without comparing some rings.
     fn follow_rings(
         &mut self,
         conversation: &Conversation,
@@ -269,7 +268,7 @@ impl Twin {
         !self.drives(ram::FLAGS2, monitors).is_empty()
     }
 
-    /// Drives with such a byte in a cell.
+    /// The drives whose cell holds such a byte.
     fn drives(&self, address: u16, such: impl Fn(u8) -> bool) -> BTreeSet<(usize, u8)> {
         let rings = self.sizes.iter().enumerate();
         let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
@@ -301,7 +300,7 @@ impl Twin {
         (comparisons, diverged || !left_out.is_empty())
     }
 
-    /// The same up to the first conversation in which a byte differs.
+    /// As [`Self::follow_all`], up to the first conversation in which a byte differs.
     pub(crate) fn follow_while_alike(
         &mut self,
         conversations: &[Conversation],
@@ -377,7 +376,7 @@ impl Twin {
         }
     }
 
-    /// Lets time pass in which nothing is sent, until every drive has tested itself after its power-up (11.8).
+    /// Lets time pass without sending, until every drive has tested itself after its power-up (11.8).
     pub(crate) fn rest_through_self_tests(&mut self) {
         const STEP: Span = Span::from_millis(200);
         const LONGEST: Span = Span::from_millis(61_000);

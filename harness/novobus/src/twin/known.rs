@@ -15,8 +15,7 @@ use harness_proto::novobus::output::Output;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How many different values must come out of as many resets before a cell counts as one that a reset does not clear: one value may
-/// be what the drive loads or sets.
+/// Number of different values that must survive as many resets before a cell counts as not cleared: the drive may load or set one value itself.
 const SURVIVALS: usize = 3;
 
 /// A byte of a drive: its ring, counted from 0, the drive, and the address.
@@ -25,16 +24,16 @@ pub(crate) type CellByte = (usize, u8, u16);
 /// What the master does to a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Write {
-    /// It writes all bits.
+    /// Writes all bits.
     Set(u8),
-    /// It clears the bits that are 0 here.
+    /// Clears the bits that are 0 here.
     And(u8),
-    /// It sets the bits that are 1 here.
+    /// Sets the bits that are 1 here.
     Or(u8),
 }
 
 impl Write {
-    /// The bits that it decides.
+    /// The bits whose value it decides.
     const fn bits(self) -> u8 {
         match self {
             Self::Set(_) => 0xFF,
@@ -43,7 +42,7 @@ impl Write {
         }
     }
 
-    /// What becomes of a byte.
+    /// The byte after it.
     const fn apply(self, byte: u8) -> u8 {
         match self {
             Self::Set(data) => data,
@@ -108,16 +107,16 @@ struct KnownByte {
     zero: bool,
 }
 
-/// What a byte that was read says.
+/// The judgement on a byte that was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ByteRead {
-    /// It is as it must be.
+    /// The value is right.
     Right,
-    /// It is not.
+    /// The value is wrong.
     Wrong,
-    /// Its value is the drive's choice, and the master has read it for the first time.
+    /// The value is the drive's choice, and it was read for the first time.
     Learned,
-    /// Its value is the drive's choice at any time.
+    /// The value is the drive's choice at any time.
     Own,
 }
 
@@ -131,21 +130,20 @@ fn is_lost(address: u16) -> bool {
 /// How long an order to the controller of the EEPROM may take. The manual gives no time; the copy of the 32 parameters takes the model 320 ms.
 const LONGEST_ORDER: Span = Span::from_millis(4_000);
 
-/// How long a drive may take to delete its error once the master has confirmed it. The manual gives no time; the cycle control works in
-/// cycles of 432 us (4.1).
+/// Longest time between the confirmation of an error and its deletion. The manual gives none; a cycle of the cycle control is 432 us (4.1).
 pub(super) const LONGEST_CONFIRMATION: Span = Span::from_millis(500);
 
-/// What is known of all drives.
+/// The knowledge about the cells of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
     cells: BTreeMap<CellByte, KnownByte>,
     /// Parts of drives that the master has started: from then on they write their cells until the next reset.
     started: BTreeSet<(usize, u8, Worker)>,
-    /// What the manual decides of the cells of each drive's program.
+    /// For each drive, what the manual decides of the cells of its program.
     programs: BTreeMap<(usize, u8), Program>,
     /// Drives that have shown since the attempt began that their reset is over.
     working: BTreeSet<(usize, u8)>,
-    /// The present conversation has faults: a drive may have been switched off and on.
+    /// Whether the present conversation has faults: a drive may have been switched off and on.
     disturbed: bool,
     /// What cells held before the last reset, if the master wrote all of it in the present attempt.
     before_reset: BTreeMap<CellByte, u8>,
@@ -155,7 +153,7 @@ pub(crate) struct Knowledge {
     not_lost: BTreeMap<CellByte, BTreeSet<u8>>,
     /// Drives whose EEPROM may have been written in the present attempt.
     saved: BTreeSet<(usize, u8)>,
-    /// When the byte in hand is due.
+    /// When the present byte is due.
     now: Instant,
     /// When cells were given an order whose end the drive has not shown in the present conversation: one to the controller of the EEPROM in
     /// `EEPROMcontrol`, the confirmation of an error in `errorcode`.
@@ -175,7 +173,7 @@ impl Knowledge {
         self.working.clear();
     }
 
-    /// A conversation begins, with or without faults.
+    /// Begins a conversation, with or without faults.
     pub(crate) fn converse(&mut self, faults: bool) {
         self.ordered.clear();
         if faults || self.disturbed {
@@ -185,13 +183,12 @@ impl Knowledge {
         self.disturbed = faults;
     }
 
-    /// The next byte is due.
+    /// Sets the time to that of the next byte.
     pub(crate) const fn proceed_to(&mut self, due: Instant) {
         self.now = due;
     }
 
-    /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
-    /// (14.10.5).
+    /// Notes that a drive was reset (ND21 10.5): its cells are loaded from its EEPROM, which it takes any time to write (14.10.5).
     pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
         let of_it = |place: &CellByte| (place.0, place.1) == (ring, drive);
         // The bits of a cell that are lost, all of them written in the present attempt.
@@ -236,7 +233,7 @@ impl Knowledge {
         written.then_some(byte.value & flags2::MONITORING != 0)
     }
 
-    /// The master has written to a byte.
+    /// Notes that the master has written to a byte.
     pub(crate) fn write(&mut self, place: CellByte, write: Write) {
         let (ring, drive, address) = place;
         let started = match address {
@@ -291,7 +288,7 @@ impl Knowledge {
         byte.zero = false;
     }
 
-    /// Process data of the master's have come to a drive (ND21 9.4, 14.10.3), which writes them where `DataIn` says.
+    /// Notes process data of the master (ND21 9.4, 14.10.3), which a drive writes where its `DataIn` says.
     pub(crate) fn take_process_data(&mut self, ring: usize, drive: u8, data: [u8; 2]) {
         match self.target(ring, drive, ram::DATA_IN) {
             Some(target) => {
@@ -310,7 +307,7 @@ impl Knowledge {
         }
     }
 
-    /// The same as [`Self::write`] where it is not known whether the drive took it.
+    /// As [`Self::write`], if it is not known whether the drive took it.
     pub(crate) fn may_write(&mut self, place: CellByte, write: Write) {
         self.write(place, write);
         self.cells.remove(&place);
@@ -413,7 +410,7 @@ impl Knowledge {
         not_lost.len() > 1
     }
 
-    /// The checking byte after a byte that was read was right: where that byte was 00, the cell holds it.
+    /// Notes that the checking byte after a byte was right: if that byte was 00, the cell holds 00.
     pub(crate) fn confirm_zero(&mut self, place: CellByte) {
         if let Some(byte) = self.cells.get_mut(&place).filter(|byte| byte.zero) {
             *byte = KnownByte {

@@ -16,21 +16,20 @@ use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 
-/// How long after the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
+/// Longest silence after which a drive that monitors detects a time-out (ND21 9.9, 14.10.2).
 const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
-/// How long a drive that monitors hears nothing at least before it detects a time-out (ND21 9.9). A drive of the model that is wrong on
-/// purpose may detect one earlier.
+/// Shortest silence after which a drive that monitors detects a time-out (ND21 9.9). A model that deviates may detect one earlier.
 pub(crate) const EARLIEST_TIME_OUT: Span = Span::from_millis(10);
 
 /// How long in front of unasked bytes the silence may have begun that they come from: it lasts 20 ms at most, and a drive waits for 10 ms
 /// more. Twice as long is certain.
 const BEFORE_ZEROS: Span = Span::from_millis(60);
 
-/// How much earlier than on a line a byte may come back over a socket that keeps the times of a line.
+/// Maximum time by which a byte is earlier over a socket that keeps a line's times than on a line.
 const EARLY: Span = Span::from_millis(1);
 
-/// How inexact the clocks of the bench and of a drive may be over the time of a time-out.
+/// Maximum error of the clocks of the bench and of a drive over the time of a time-out.
 const CLOCKS: Span = Span::from_micros(500);
 
 /// How many bytes after a silence come back as they were sent where the bench knows when it ended: they take four times [`EARLY`]. A
@@ -44,7 +43,7 @@ type TimedByte = (Instant, Received);
 pub(crate) const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
     (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
 
-/// Where a race of clocks begins: at the first byte that was sent unasked.
+/// A race of clocks, which begins at the first byte that was sent unasked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Race {
     /// Its place among the bytes received.
@@ -55,22 +54,22 @@ pub(crate) struct Race {
     pub(crate) fault: Option<(usize, Symptom)>,
 }
 
-/// When the bytes of the master's that are answered were sent, in order, and the other bytes.
+/// The times at which the master's bytes were sent.
 pub(crate) struct SentTimes<'a> {
-    /// When each byte that is answered began.
+    /// The start of each byte that is answered, in order.
     pub(crate) answered: &'a [Instant],
-    /// When every byte began.
+    /// The start of every byte, in order.
     pub(crate) all: &'a [Instant],
-    /// How long after the start of a byte its answer comes.
+    /// Time from the start of a byte to its answer.
     pub(crate) way: Span,
-    /// How long a drive that monitors hears nothing at least before it detects a time-out.
+    /// Shortest silence after which a drive that monitors detects a time-out.
     pub(crate) earliest: Span,
     /// Whether the model answers each byte.
     pub(crate) complete: bool,
 }
 
 impl SentTimes<'_> {
-    /// The first byte received from `from` on that came before the byte of the master's that it would answer.
+    /// The first byte received from `from` on that came before the master's byte that it would answer.
     fn first(&self, received: &[TimedByte], from: Instant) -> Option<usize> {
         let unasked = |(index, (at, _)): (usize, &TimedByte)| {
             let early = self.answered.get(index).is_none_or(|start| at < start);
@@ -79,9 +78,9 @@ impl SentTimes<'_> {
         received.iter().enumerate().position(unasked)
     }
 
-    /// From when on the bench itself may be the cause of a difference, where the bytes before `right` do not differ: they are as expected, or
-    /// the drives' choice. Drives that `may` monitor time-outs miss their bytes when it is silent
-    /// or late; and a model that `does` is wrong about the time of a silence when the bench was late.
+    /// The time from which on the bench itself may be the cause of a difference. The bytes before `right` do not differ: they are as expected, or
+    /// the drives' choice. If drives `may` monitor time-outs, they miss bytes while the bench is silent or late. If the model `does`, it is wrong
+    /// about the time of a silence when the bench was late.
     pub(crate) fn excused_from(
         &self,
         size: RingSize,
@@ -103,8 +102,7 @@ impl SentTimes<'_> {
         Some(received[first].0)
     }
 
-    /// The first byte that is as expected and came back before the bench says that it was sent: the bench was late, and does not know how long
-    /// the line was silent.
+    /// The first byte that is as expected and came back before it was sent: the bench was late, and does not know how long the line was silent.
     fn early(&self, expected: &[TimedByte], received: &[TimedByte]) -> Option<usize> {
         let value = |heard: &[TimedByte], index: usize| heard.get(index).map(|(_, byte)| *byte);
         let same = |index: &usize| value(expected, *index) == value(received, *index);
@@ -200,7 +198,7 @@ impl SentTimes<'_> {
         first
     }
 
-    /// The place after the bytes that have come before the next byte of the master's, from an unasked one on.
+    /// The place past the bytes, from an unasked one on, that came before the master's next byte.
     fn end_of_race(&self, heard: &[TimedByte], first: usize) -> usize {
         let (from, _) = heard[first];
         let next = self.all.partition_point(|start| *start <= from);
