@@ -22,7 +22,6 @@ pub(crate) type TelegramTalk = LineTalk<Nordac>;
 /// An act of a conversation.
 pub(crate) type TelegramAct = LineAct<TelegramActKind>;
 
-/// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum TelegramActKind {
@@ -39,7 +38,7 @@ pub(crate) enum TelegramActKind {
     /// Inverter and module lose each other, or find each other again.
     Link {
         slave: u8,
-        /// Whether they find each other.
+        /// Whether they find each other, or lose each other.
         found: bool,
     },
     /// The cause of a fault comes, or goes.
@@ -47,7 +46,7 @@ pub(crate) enum TelegramActKind {
         slave: u8,
         /// The fault, 1 to 25.
         number: u8,
-        /// Whether it comes.
+        /// Whether it comes or goes.
         on: bool,
     },
     /// A slave is switched off and on.
@@ -58,9 +57,9 @@ pub(crate) enum TelegramActKind {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Request {
-    /// To which station.
+    /// The station that it is sent to.
     pub(crate) da: u8,
-    /// From which master.
+    /// The master that sends it.
     pub(crate) sa: u8,
     /// Bits 3 to 0 of FC.
     pub(crate) function: u8,
@@ -110,17 +109,17 @@ pub(crate) enum Harm {
     Replace(u8, u8),
     /// The line is idle for this number of microseconds in front of it.
     Gap(u8, u16),
-    /// The last octets, this many, are left out.
+    /// This number of octets at the end is left out.
     Short(u8),
     /// This octet stands after the last one.
     Long(u8),
 }
 
-/// A telegram that goes out.
+/// A telegram as it is sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct OutgoingTelegram {
     pub(crate) octets: Vec<u8>,
-    /// What happens to one of them on the line, and its place.
+    /// The place of an octet that the line changes, and how.
     pub(crate) bad: Option<(usize, LinkFault)>,
 }
 
@@ -153,7 +152,7 @@ impl Counts {
             .unwrap_or_default()
     }
 
-    /// What goes out for an act; `None` where it sends nothing.
+    /// The telegram of an act; `None` if it sends nothing.
     pub(super) fn outgoing(&mut self, what: &TelegramActKind) -> Option<OutgoingTelegram> {
         let (octets, harm) = match what {
             TelegramActKind::Ask(request) => (self.octets(request), request.harm),
@@ -220,7 +219,7 @@ impl TelegramActKind {
         }
     }
 
-    /// How much it holds.
+    /// Its size, by which simpler cases are preferred.
     pub(super) fn weight(&self) -> u64 {
         match self {
             Self::Ask(request) => {

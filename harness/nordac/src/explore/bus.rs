@@ -236,7 +236,7 @@ impl LineBus for Nordac {
         timed: Option<usize>,
         text: &mut String,
     ) {
-        steps(talk, seen, (timed, setup.rate.octet_time()), text);
+        steps(talk, seen, timed, setup.rate.octet_time(), text);
     }
 }
 

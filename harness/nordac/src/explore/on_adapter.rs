@@ -26,13 +26,13 @@ use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 
-/// How long the line is left alone after a telegram that is not answered.
+/// The idle time after a telegram that has no reply.
 const UNANSWERED: Span = Span::from_millis(2);
 
-/// The same at the end of a conversation.
+/// The idle time at the end of a conversation.
 const REST: Span = Span::from_millis(20);
 
-/// What is known of the slaves of a run.
+/// The state of a run's slaves, as the bench knows it.
 #[derive(Debug)]
 pub(crate) struct SlaveLog {
     /// The telegrams of the last conversation.
@@ -186,12 +186,12 @@ impl LineRig for Nordac {
     }
 }
 
-/// Whether a telegram begins these octets and others follow it: whether a slave takes it depends on the gap between them.
+/// Whether these octets are a telegram and more. A slave takes such a telegram or not, depending on the gap.
 fn is_followed(octets: &[u8]) -> bool {
     matches!(Telegram::decode(octets), Decoded::Value { used, .. } if used < octets.len())
 }
 
-/// What goes out for each act of a conversation, once for each time; `None` where an act sends nothing.
+/// The telegrams of each act of a conversation, one for each time; `None` if it sends nothing.
 fn telegrams(talk: &TelegramTalk) -> Vec<Vec<Option<OutgoingTelegram>>> {
     let mut counts = Counts::default();
     let mut of = |act: &TelegramAct| {
@@ -262,7 +262,7 @@ impl Conversation<'_> {
         }
     }
 
-    /// Takes what comes, until it is a whole telegram or the time is over. Whether anything came.
+    /// Takes octets until they are a whole telegram or the time is over. Returns whether any came.
     fn reply(&mut self, until: Instant) -> bool {
         let (mut until, last) = (until, until + self.patience);
         let mut octets = Vec::new();
@@ -297,7 +297,7 @@ impl Conversation<'_> {
         came
     }
 
-    /// Lets time pass. What comes is not asked for.
+    /// Lets time pass. What comes is unasked.
     fn pass(&mut self, time: Span) {
         let until = self.link.now() + time;
         let last = until + self.patience;

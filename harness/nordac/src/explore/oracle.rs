@@ -32,7 +32,7 @@ pub(crate) struct TelegramDifference {
     pub(crate) about: String,
 }
 
-/// Every property with every value.
+/// Every property with each of its values.
 fn values() -> impl Iterator<Item = (&'static Description, String)> {
     PROPERTIES.iter().flat_map(|property| {
         let words: Vec<String> = match property.accepts {
@@ -74,7 +74,7 @@ pub(super) fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String
     lines
 }
 
-/// How unlike two telegrams are.
+/// The distance of two telegrams: 0 if they are equal.
 pub(super) fn unlike(a: &HeardTelegram, b: &HeardTelegram) -> i64 {
     let sender = i64::from(a.from != b.from);
     let length = a.octets.len().abs_diff(b.octets.len()) as i64;
@@ -152,7 +152,7 @@ pub(super) fn difference(
     })
 }
 
-/// Behind which act a telegram was sent, counted as they happened.
+/// The number of the act after which a telegram was sent.
 fn asked(seen: &TelegramsSeen, telegram: &HeardTelegram) -> Option<usize> {
     let before = |done: &PlayedAct| done.sent.is_some() && done.at < telegram.at;
     seen.done.iter().rposition(before)

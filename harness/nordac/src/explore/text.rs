@@ -16,7 +16,8 @@ const EXACT: Span = Span::from_nanos(100);
 pub(super) fn steps(
     case: &TelegramTalk,
     seen: &TelegramsSeen,
-    (timed, octet): (Option<usize>, Span),
+    timed: Option<usize>,
+    octet: Span,
     text: &mut String,
 ) {
     let mut replies = (1..).zip(&seen.said).peekable();

@@ -12,7 +12,7 @@ use crate::twin::{Comparison, Conversation, Divergence, Done};
 use harness_bench::scenario::times::Duration;
 use harness_proto::time::Span;
 
-/// The largest ring of which single drives are tried.
+/// The largest ring in which choices of single drives are tried.
 const SMALL: u8 = 16;
 
 /// The property of the time after which drives that monitor the line report a silence (ND21 9.9).
@@ -21,9 +21,9 @@ const TIME_OUT: &str = "time-out";
 /// Choices that explain every byte of an attempt.
 pub(crate) struct Explanation {
     pub(crate) words: String,
-    /// What makes simulated drives behave so.
+    /// The header that makes simulated drives behave so.
     pub(crate) header: Header,
-    /// How the conversations compare with these drives'.
+    /// The comparisons of the conversations with these drives.
     pub(crate) comparisons: Vec<Comparison>,
     /// Whether the bytes that they explain come before the steps of the scenario: nothing that it asks for depends on the choices.
     pub(crate) before_steps: bool,
@@ -80,11 +80,11 @@ pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
 /// Where an attempt first differs from a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct FirstDifference {
-    /// In which conversation, counted from 1; 0 where the choice makes no ring.
+    /// The conversation, counted from 1; 0 if the choice makes no ring.
     conversation: usize,
-    /// How; `None` where the choice makes no ring.
+    /// The difference; `None` if the choice makes no ring.
     divergence: Option<Box<Divergence>>,
-    /// How many bytes were compared up to there. What ends its comparison before explains nothing (ND21 9.9).
+    /// Number of bytes compared before it. A choice that ends the comparison earlier explains nothing (ND21 9.9).
     compared: u64,
 }
 
@@ -100,7 +100,7 @@ fn compared(comparisons: &[Comparison]) -> u64 {
     comparisons.iter().map(|result| result.compared).sum()
 }
 
-/// Where a silence of the bench has ended the comparison.
+/// The place at which a silence of the bench has ended the comparison.
 fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
     let last = comparisons.last().filter(|result| result.silenced)?;
     Some(FirstDifference {
@@ -161,7 +161,7 @@ fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
         .collect()
 }
 
-/// A pause of received bytes that is longer than any between two bytes of drives that answer.
+/// A pause longer than any between two received bytes while drives answer.
 const PAUSE: Span = Span::from_millis(50);
 
 /// How long drives may have been silent after their reset (ND21 10.5, 11.8), where the bench has sent bytes to which none came back: the

@@ -17,10 +17,10 @@ use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
 
-/// Cells that the twin took over and that are listed at most.
+/// Maximum number of listed cells that the twin took over.
 const MOST_ADOPTED: usize = 8;
 
-/// What is known of an attempt besides its outcome.
+/// The facts of an attempt besides its outcome.
 pub(crate) struct AttemptFacts<'h> {
     pub rig: &'h Rig,
     pub plan: &'h Plan,
@@ -29,11 +29,11 @@ pub(crate) struct AttemptFacts<'h> {
     pub exactness: Exactness,
     /// The conversations that were compared.
     pub conversations: &'h [Conversation],
-    /// How they compare with the twin's; fewer where the rest could not be compared.
+    /// Their comparisons with the twin; fewer if the rest could not be compared.
     pub comparisons: &'h [Comparison],
     /// Line errors that the transport reported without their bytes.
     pub unplaced: u64,
-    /// Is called as long as the program works: explaining a difference takes time.
+    /// Called again and again while a difference is explained, which takes time.
     pub alive: &'h dyn Fn(),
 }
 
@@ -103,7 +103,7 @@ fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, facts: &Att
     }
 }
 
-/// A byte differs from the twin's. Returns the choices of the manual with which none does, where the scenario does not depend on them.
+/// Judges an attempt with a byte that differs from the twin's. Returns the choices of the manual that explain it, if the scenario does not depend on them.
 fn diverged(
     outcome: &mut Outcome,
     divergence: &Divergence,
@@ -172,7 +172,7 @@ fn compared_with(found: &Explanation, outcome: &mut Outcome) {
     }
 }
 
-/// The scenario failed, and the drives gave every byte that the twin gave.
+/// Judges a scenario that failed although every byte is the twin's.
 fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &AttemptFacts<'_>) {
     let Some(finding) = &outcome.finding else {
         return;
@@ -238,7 +238,7 @@ fn may_be_late(facts: &AttemptFacts<'_>) -> bool {
         && facts.comparisons.iter().any(|result| result.monitored)
 }
 
-/// The computer was late, which accuses no drive and speaks for none.
+/// Makes the attempt inconclusive, because the computer was late: that accuses no drive and clears none.
 const fn late(outcome: &mut Outcome) {
     outcome.verdict = Verdict::Inconclusive;
     outcome.shows_nothing = true;
@@ -358,7 +358,7 @@ pub(crate) fn known(rig: &Rig) -> Header {
     rig.file.deviation.iter().flat_map(of_entry).collect()
 }
 
-/// Whether a known deviation is none that the simulator has.
+/// Whether the simulator does not have a known deviation.
 pub(crate) fn by_hand(entry: &Deviation) -> bool {
     deviation::deviation(&entry.name).is_none()
 }

@@ -12,7 +12,6 @@ pub(crate) type FrameTalk = LineTalk<Unitek>;
 /// An act of a conversation.
 pub(crate) type FrameAct = LineAct<FrameActKind>;
 
-/// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum FrameActKind {

@@ -79,7 +79,7 @@ impl LineBus for Unitek {
     type Setup = Setup;
     type Properties = Properties;
     type Said = LineFrame;
-    /// When it began.
+    /// The time at which an act began.
     type Done = Instant;
     type Difference = FrameDifference;
 

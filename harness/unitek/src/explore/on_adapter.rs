@@ -20,16 +20,16 @@ use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::{Register, Request};
 use harness_sim::record::LineFrame;
 
-/// How long frames that are under way may take.
+/// Maximum time until frames under way have come.
 const UNDER_WAY: Span = Span::from_millis(60);
 
 /// The bit rate: a drive that takes it at once is lost (3.2, `rate-change`).
 const RATE: u8 = 0x73;
 
-/// Frames that are sent at a time between cases.
+/// Number of frames sent at a time between cases.
 const BURST: usize = 16;
 
-/// What a run has to put right.
+/// What a run must put back.
 #[derive(Debug)]
 pub(crate) struct Leftovers {
     /// Registers with cycles that earlier cases may have left; all of them before the first case.
@@ -144,7 +144,7 @@ impl LineRig for Unitek {
     }
 }
 
-/// Why a frame is not sent after which a drive may not be reached; `None` if it is sent. A case of which one byte was changed may hold any.
+/// Why a frame is not sent because the drive may not be reached after it; `None` if it is sent. A mutated case may hold any frame.
 fn not_reached(frame: &Frame) -> Option<String> {
     let rx = u16::try_from(frame.id().number()).ok()?;
     match Request::decode(frame, rx, Dlc4::As3) {

@@ -131,7 +131,7 @@ pub(super) fn same_frame(a: &Frame, b: &Frame) -> bool {
     head(a) == head(b) && meaning(a) == meaning(b)
 }
 
-/// How unlike two frames are.
+/// The distance of two frames: 0 if they are equal.
 pub(super) fn unlike(a: &LineFrame, b: &LineFrame) -> i64 {
     let (one, other) = (&a.frame, &b.frame);
     let head = i64::from(one.id() != other.id()) + i64::from(one.is_remote() != other.is_remote());
