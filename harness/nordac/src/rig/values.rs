@@ -4,14 +4,14 @@ use harness_proto::nordac::guard::{Class, class};
 use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::{PARAMETERS, Parameter};
 
-/// A value for a parameter.
+/// A value that a walk writes to a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WalkedValue {
-    /// What it is for, in a report.
+    /// The name of its kind in a report.
     pub(super) name: &'static str,
     pub(super) parameter: &'static Parameter,
     pub(super) value: i32,
-    /// Why it is not written whatever the rig's file permits; `None` where it is.
+    /// Why it is not written, whatever the rig's file permits; `None` if it may be.
     pub(super) left_out: Option<&'static str>,
 }
 

@@ -25,10 +25,10 @@ const BOUNDS: WalkBounds = WalkBounds {
 /// How long an exchange takes behind an adapter, at most, in ms (our choice).
 const EXCHANGE: u64 = 4;
 
-/// How often a task is sent: its answer comes with the second reply after it.
+/// Number of exchanges with a task: its answer comes with the second reply after it.
 const ANSWERED: usize = 3;
 
-/// What an exchange brings to an inverter.
+/// What is new in an exchange.
 #[derive(Clone, Copy)]
 enum ExchangeInput {
     /// A control word.
@@ -72,7 +72,7 @@ const INPUTS: [Input; 22] = [
     ("nothing but bit 10", Word(0x0400)),
 ];
 
-/// By what the states of an inverter differ.
+/// What distinguishes the states of an inverter.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct State {
     /// That of the table, by its short name (NORDAC 3.3).
@@ -288,7 +288,7 @@ fn inputs() -> Vec<Input> {
     INPUTS.into_iter().chain(values).collect()
 }
 
-/// Their names.
+/// The names of the inputs, in the order of their numbers.
 pub(super) fn names() -> Vec<&'static str> {
     inputs().into_iter().map(|(name, _)| name).collect()
 }

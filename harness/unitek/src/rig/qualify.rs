@@ -47,10 +47,10 @@ const PRINTED: RangeInclusive<u16> = 0x201..=0x27F;
 /// The identifiers on which a drive may send (UNITEK 3.1).
 const PRINTED_TO_SEND: RangeInclusive<u16> = 0x181..=0x1FF;
 
-/// What a probe needs that is not made by default.
+/// What a probe needs beyond the default permissions.
 #[derive(Clone, Copy)]
 enum Need {
-    /// Nothing: reads, cycles, STATUS_MASK and the lock.
+    /// Nothing more than reads, cycles, STATUS_MASK and the lock.
     Nothing,
     /// Motors may turn.
     Motion,
@@ -58,7 +58,7 @@ enum Need {
     MotionAndBusSettings,
     /// Identifiers may be changed, and not stored.
     BusSettings,
-    /// Identifiers may be changed and, where that shows nothing, the drive is switched off and on.
+    /// Identifiers may be changed; if that shows nothing, the drive is switched off and on.
     BusSettingsAndPowerUp,
     /// The drive is switched off and on.
     PowerUp,
@@ -243,7 +243,7 @@ fn settle(drives: &mut [Known], place: usize, notes: &[&DriveNote]) {
     }
 }
 
-/// What a drive has shown of each point.
+/// What each drive has shown of each point.
 fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
     PROPERTIES.iter().flat_map(move |property| {
         drives.iter().map(move |known| Point {

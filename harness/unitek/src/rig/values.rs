@@ -8,14 +8,14 @@ use harness_proto::unitek::guard::{Class, Limits, ValueRange, class};
 use harness_proto::unitek::{Register, Width};
 use std::collections::BTreeSet;
 
-/// A value for a register.
+/// A value that a walk writes to a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WalkedValue {
-    /// What it is for, in a report.
+    /// The name of its kind in a report.
     pub(super) name: &'static str,
     pub(super) register: &'static Register,
     pub(super) raw: u32,
-    /// Why it is not written whatever the rig's file permits; `None` where it is.
+    /// Why it is not written, whatever the rig's file permits; `None` if it may be.
     pub(super) left_out: Option<&'static str>,
 }
 

@@ -33,7 +33,7 @@ const SPEED: u8 = 0x30;
 enum DriveInput {
     /// A request of a register (UNITEK 5.2 item 1).
     Read(u8),
-    /// Frames on its identifier, and how many ms pass after each of them.
+    /// Frames on its identifier, and the time in ms after each.
     Frames(&'static [(&'static [u8], u64)]),
     /// A remote frame (4.4).
     Remote,
@@ -179,7 +179,7 @@ const FIRST: [&[u8]; 6] = [
     &[0xD4, 0, 0, 0, 0],
 ];
 
-/// Frames after a walk.
+/// Frames after a walk, and the time in ms after each.
 const LAST: [(&[u8], u64); 4] = [
     (&[0x3D, CYCLIC, 0xFF], 12),
     (&[0x31, 0, 0], 30),
@@ -187,7 +187,7 @@ const LAST: [(&[u8], u64); 4] = [
     (&[0x52, 0, 0, 0, 0], 0),
 ];
 
-/// By what the states of a drive differ.
+/// What distinguishes the states of a drive.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct State {
     enabled: bool,
@@ -226,7 +226,7 @@ impl Model {
         }
     }
 
-    /// Sends a frame, and lets ms pass.
+    /// Sends a frame, and lets a time in ms pass.
     fn send(&mut self, frame: &Frame, millis: u64) -> Result<(), String> {
         let admitted = self.gate.admit(self.now, frame);
         admitted.map_err(|denial| match denial {
@@ -273,7 +273,7 @@ impl Model {
         (waited > 0).then(|| format!("wait {}ms", waited * 3 / 2))
     }
 
-    /// Lets ms pass.
+    /// Lets a time in ms pass.
     fn pass(&mut self, millis: u64) {
         self.now += Span::from_millis(millis);
         self.drive.advance(self.now);
@@ -443,7 +443,7 @@ fn inputs(limits: &Limits) -> Vec<Input> {
     INPUTS.into_iter().chain(values).collect()
 }
 
-/// Their names.
+/// The names of the inputs, in the order of their numbers.
 pub(super) fn names(limits: &Limits) -> Vec<&'static str> {
     inputs(limits).into_iter().map(|(name, ..)| name).collect()
 }
