@@ -110,14 +110,12 @@ fn no_right_drive_is_accused_however_late_its_frames_are() {
 }
 
 /// Deviations that lie in inputs, in a register without a meaning, or in what these scenarios do not ask for.
-const NOT_FOUND: [&str; 9] = [
+const NOT_FOUND: [&str; 7] = [
     "writes-without-sign",
     "interval-one-more",
     "lock-ends-cycles",
     "mask-is-fixed",
     "homing-by-any-value",
-    "no-eeprom",
-    "eeprom-levels-swapped",
     "limit-switches-swapped",
     "unassigned-reads-zero",
 ];
