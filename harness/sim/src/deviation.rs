@@ -30,6 +30,12 @@ impl<Injection> Deviation<Injection> {
             injection,
         }
     }
+
+    /// Its name, section and effect in a sentence; `manual` is the document of the section.
+    #[must_use]
+    pub fn sentence(&self, manual: &str) -> String {
+        format!("{} ({manual} {}): {}", self.name, self.section, self.about)
+    }
 }
 
 impl<Injection> fmt::Debug for Deviation<Injection> {

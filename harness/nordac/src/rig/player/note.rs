@@ -339,13 +339,7 @@ impl Note for SlaveNote {
     }
 
     fn words(deviation: &Deviation) -> String {
-        let Deviation {
-            name,
-            section,
-            about,
-            ..
-        } = deviation;
-        format!("{name} (NORDAC {section}): {about}")
+        deviation.sentence("NORDAC")
     }
 
     fn noted(&self) -> &AttemptSummary {

@@ -38,16 +38,11 @@ pub(super) const fn wrong(
     about: &'static str,
     how: How,
 ) -> Deviation {
-    let behind_the_bus = false;
-    Deviation::new(
-        name,
-        section,
-        about,
-        Injection {
-            behind_the_bus,
-            how,
-        },
-    )
+    let injection = Injection {
+        behind_the_bus: false,
+        how,
+    };
+    Deviation::new(name, section, about, injection)
 }
 
 /// A deviation that only a drive of the model `nd21` can have.
@@ -57,16 +52,11 @@ pub(super) const fn behind_the_bus(
     about: &'static str,
     how: How,
 ) -> Deviation {
-    let behind_the_bus = true;
-    Deviation::new(
-        name,
-        section,
-        about,
-        Injection {
-            behind_the_bus,
-            how,
-        },
-    )
+    let injection = Injection {
+        behind_the_bus: true,
+        how,
+    };
+    Deviation::new(name, section, about, injection)
 }
 
 /// All of them: first those of the bus end, then those of the drive behind it.

@@ -270,13 +270,7 @@ impl Note for DriveNote {
     }
 
     fn words(deviation: &Deviation) -> String {
-        let Deviation {
-            name,
-            section,
-            about,
-            ..
-        } = deviation;
-        format!("{name} (UNITEK {section}): {about}")
+        deviation.sentence("UNITEK")
     }
 
     fn noted(&self) -> &AttemptSummary {
