@@ -126,6 +126,9 @@ pub(super) fn set_back(
         let axis = known.axis;
         let gate = session.link().segment();
         let moved = gate.is_some_and(|gate| gate.has_moved(axis.rx));
+        if let Some(gate) = session.link().segment_mut() {
+            gate.held_before(axis.rx, held_before(known, written));
+        }
         let mut driver = session.driver();
         let mut set_back = SetBack {
             driver: &mut driver,

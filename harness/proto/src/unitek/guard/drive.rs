@@ -31,6 +31,8 @@ pub(super) struct GuardedDrive {
     /// What was written to 73 last.
     pub(super) timing: Option<u16>,
     pub(super) speed: Speed,
+    /// What it held before, outside of the stated ranges too.
+    pub(super) before: Vec<(u8, u32)>,
 }
 
 impl GuardedDrive {
@@ -49,6 +51,7 @@ impl GuardedDrive {
             moved: false,
             timing: None,
             speed: Speed::default(),
+            before: Vec::new(),
         }
     }
 

@@ -190,6 +190,11 @@ impl Gate {
         self.drives.iter_mut().for_each(GuardedDrive::doubt);
     }
 
+    /// Takes notice of what the registers of a drive held before it was used: that may be set back, whatever the stated ranges.
+    pub fn held_before(&mut self, first_rx: u16, cells: Vec<(u8, u32)>) {
+        self.with(first_rx, |drive| drive.before = cells);
+    }
+
     /// Takes notice of C8, the rpm of 100 % speed, and of 34, the limit of the speed, as they were read from the drive that receives
     /// on `rx`.
     pub fn learn(&mut self, rx: u16, full: u16, limit: u16) {
@@ -336,7 +341,8 @@ impl Gate {
             .ranges
             .iter()
             .find(|range| range.register == register);
-        if let Some(range) = range.filter(|range| !range.admits(data)) {
+        let before = drive.before.contains(&(register, data.bits()));
+        if let Some(range) = range.filter(|range| !before && !range.admits(data)) {
             return Err(Denial::Range(*range));
         }
         let denies = |max| drive.speed.denies(max, register, low(data.bits()));

@@ -288,6 +288,11 @@ fn values_within_a_stated_range() {
             "{text}"
         );
     }
+    // What the drive held at first is set back, and nothing else.
+    gate.held_before(0x201, vec![(0x76, 0x0200)]);
+    assert_eq!(denied(&mut gate, "201#760002"), None);
+    assert_eq!(denied(&mut gate, "201#760102"), Some(Denial::Range(offset)));
+    assert_eq!(denied(&mut gate, "202#760002"), Some(Denial::Range(offset)));
     let words = Denial::Range(offset).to_string();
     assert!(
         words.contains("76 (SPEED_CALIB_F) is permitted from -3 to 200"),
