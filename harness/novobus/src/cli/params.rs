@@ -13,11 +13,13 @@ use harness_bench::command::file;
 use harness_bench::command::output::Output;
 use harness_bench::command::rig_name::Use;
 use harness_bench::counted::counted;
+use harness_bench::rig::state::utc;
 use harness_bench::scenario::source::Source;
 use harness_proto::nd21::cells::Access;
 use harness_proto::nd21::eeprom::eeprom_of;
 use harness_proto::nd21::units::{Date, DriveUnits};
 use harness_proto::nd21::{PARAMETERS, ee};
+use std::time::SystemTime;
 
 /// Runs one of the commands.
 pub(crate) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exit, Failure> {
@@ -301,23 +303,7 @@ fn home(entry: &FileParameter) -> Option<MemoryRange> {
 
 /// The day (UTC); `None` if the clock is outside the range of the drive's date.
 fn today() -> Option<Date> {
-    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let mut days = since.ok()?.as_secs() / 86_400;
-    for year in 1970..=2120 {
-        for month in 1..=12 {
-            let of_month = (28..=31)
-                .rev()
-                .find(|day| Date::new(leap_alike(year), month, *day).is_some())?;
-            if days < u64::from(of_month) {
-                return Date::new(year, month, u8::try_from(days + 1).ok()?);
-            }
-            days -= u64::from(of_month);
-        }
-    }
-    None
-}
-
-/// A year with the same months that a drive can hold: before 1993 every fourth is a leap year.
-fn leap_alike(year: u16) -> u16 {
-    if year < 1993 { year + 28 } else { year }
+    let now = utc(SystemTime::now());
+    let [year, month, day] = [now.get(..4)?, now.get(5..7)?, now.get(8..10)?];
+    Date::new(year.parse().ok()?, month.parse().ok()?, day.parse().ok()?)
 }
