@@ -59,18 +59,7 @@ const RESET: Order = Order {
 
 /// Lets drives run.
 pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let as_what = leave_to(arguments, "go");
-    rig::on(&arguments.select.rig, as_what, output, |bench, output| {
-        let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
-        warn(arguments, &drives, "go", output)?;
-        let exit = each(bench, &drives, output, GO, CYCLES)?;
-        if bench.has_ports() && !arguments.hold.hold {
-            output.say(
-                "this command ends in the safe state; add --hold to leave the drives in go: their motors may then turn without supervision\n",
-            );
-        }
-        Ok(exit)
-    })
+    with_leave(arguments, output, GO, CYCLES)
 }
 
 /// Resets drives.
@@ -88,7 +77,7 @@ pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Ex
         // After a reset the drives' state is unknown: the check sequence (9.8) follows, which the master does not send by itself.
         reset_drives(session.link(), &drives).map_err(|why| denied(session, why.to_string()))
     };
-    let what = leave_to(arguments, "reset");
+    let what = Use::new("reset", arguments.leave, arguments.hold.hold);
     rig::on_after(
         &arguments.select.rig,
         what,
@@ -113,14 +102,6 @@ fn denied(session: &mut Session, why: String) -> Failure {
     }
 }
 
-fn leave_to(arguments: &MoveArguments, purpose: &'static str) -> Use {
-    Use {
-        purpose,
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    }
-}
-
 /// Stops drives.
 pub(crate) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
     quietly(arguments, output, STOP)
@@ -136,10 +117,7 @@ pub(crate) fn delete_error(
     arguments: &DeleteErrorArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let what = Use {
-        moves: arguments.leave,
-        ..Use::look("delete-error")
-    };
+    let what = Use::new("delete-error", arguments.leave, true);
     let select = &arguments.select;
     rig::on(&select.rig, what, output, |bench, output| {
         let drives = axes::select(&select.drives, &bench.bus.axes())?;
@@ -166,18 +144,24 @@ fn quietly(
     })
 }
 
-/// Warns which motors may turn before the command runs, and refuses it without `--move`.
+/// Warns which motors may turn before the command runs, and refuses it without `--move`. At ports `go` is the only command that runs this.
 fn with_leave(
     arguments: &MoveArguments,
     output: &mut Output,
     order: Order,
     wait: Span,
 ) -> Result<Exit, Failure> {
-    let as_what = leave_to(arguments, order.what);
+    let as_what = Use::new(order.what, arguments.leave, arguments.hold.hold);
     rig::on(&arguments.select.rig, as_what, output, |bench, output| {
         let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
         warn(arguments, &drives, order.what, output)?;
-        each(bench, &drives, output, order, wait)
+        let exit = each(bench, &drives, output, order, wait)?;
+        if bench.has_ports() && !arguments.hold.hold {
+            output.say(
+                "this command ends in the safe state; add --hold to leave the drives in go: their motors may then turn without supervision\n",
+            );
+        }
+        Ok(exit)
     })
 }
 

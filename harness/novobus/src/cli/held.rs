@@ -59,11 +59,7 @@ pub(super) fn hold(
         bench: None,
     };
     let ready = held.open().and_then(|()| {
-        let as_what = Use {
-            purpose: "shell",
-            moves: held.moves,
-            holds: true,
-        };
+        let as_what = Use::new("shell", held.moves, true);
         held.bench()?.confirm_bus_errors(as_what, output)
     });
     match ready {

@@ -31,11 +31,8 @@ pub(crate) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exi
             })
         }
         ParamsCommand::Load(arguments) => {
-            let what = Use {
-                purpose: "params load",
-                moves: arguments.yes,
-                holds: arguments.hold.hold || !arguments.yes,
-            };
+            let holds = arguments.hold.hold || !arguments.yes;
+            let what = Use::new("params load", arguments.yes, holds);
             compare(&arguments.params, what, output, |comparison, output| {
                 load(arguments, comparison, output)
             })

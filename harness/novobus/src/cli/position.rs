@@ -35,11 +35,7 @@ pub(crate) fn position(
     arguments: &PositionArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let what = Use {
-        purpose: "position",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let what = Use::new("position", arguments.leave, arguments.hold.hold);
     rig::on(&arguments.rig, what, output, |bench, output| {
         turn(arguments, bench, output)
     })

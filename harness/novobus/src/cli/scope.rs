@@ -41,11 +41,8 @@ pub(crate) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<E
         .map(|name| Signal::new(name))
         .collect::<Result<Vec<_>, _>>()?;
     let then = assignments(&arguments.then)?;
-    let what = Use {
-        purpose: "scope",
-        moves: arguments.leave,
-        holds: arguments.hold.hold || then.is_empty(),
-    };
+    let holds = arguments.hold.hold || then.is_empty();
+    let what = Use::new("scope", arguments.leave, holds);
     rig::on(&arguments.rig, what, output, |bench, output| {
         record(arguments, &signals, &then, bench, output)
     })

@@ -95,11 +95,7 @@ impl Orders {
 /// Writes cells and shows them before and after.
 pub(crate) fn write(arguments: &WriteArguments, output: &mut Output) -> Result<Exit, Failure> {
     let values = assignments(&arguments.values)?;
-    let what = Use {
-        purpose: "write",
-        moves: arguments.leave,
-        holds: arguments.hold.hold,
-    };
+    let what = Use::new("write", arguments.leave, arguments.hold.hold);
     rig::on(&arguments.rig, what, output, |bench, output| {
         change(arguments, &values, bench, output)
     })
