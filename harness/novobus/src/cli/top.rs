@@ -12,6 +12,7 @@ use harness_bench::command::output::Output;
 use harness_bench::command::rig_name::{RigName, Use};
 use harness_bench::command::top::{RateWindow, TopReader, TopScene, check, live, once};
 use harness_bench::counted::counted;
+use harness_bench::rig::file::Ring;
 use harness_bench::top::{HeadLine, Heading, Snapshot, Top, view};
 use harness_bench::web::LiveNews;
 use harness_proto::nd21::State;
@@ -93,17 +94,11 @@ fn heading(name: &str, bench: &OpenBench) -> (Heading, String) {
     }
     let places = bench.with_rig(|session| {
         let rings = session.rig().rings();
-        let place = |ring: &harness_bench::rig::file::Ring| match &ring.endpoint.port {
-            Some(port) => format!(
-                "{} {port}, {} 8O1",
-                ring.endpoint.transport.name(),
-                ring.endpoint.line.baud()
-            ),
-            None => format!(
-                "{}, {} 8O1",
-                ring.endpoint.transport.name(),
-                ring.endpoint.line.baud()
-            ),
+        let place = |ring: &Ring| {
+            let end = &ring.endpoint;
+            let port = end.port.iter().map(|port| format!(" {port}"));
+            let (port, baud) = (port.collect::<String>(), end.line.baud());
+            format!("{}{port}, {baud} 8O1", end.transport.name())
         };
         (
             session.rig().id().to_owned(),
