@@ -19,7 +19,6 @@ mod signal;
 pub(crate) mod sim;
 mod top;
 mod top_page;
-mod watch;
 mod write;
 
 pub(crate) use rig::give_back_session;
@@ -58,7 +57,7 @@ fn perform(command: &DriveCommand, output: &mut Output) -> Result<Exit, Failure>
         DriveCommand::Read(arguments) => read::read(arguments, output),
         DriveCommand::Write(arguments) => write::write(arguments, output),
         DriveCommand::Info(arguments) => info::info(arguments, output),
-        DriveCommand::Watch(arguments) => watch::watch(arguments, output),
+        DriveCommand::Watch(arguments) => read::watch(arguments, output),
         DriveCommand::Top(arguments) => top::top(arguments, output),
         DriveCommand::Params(command) => params::params(command, output),
         DriveCommand::Scope(arguments) => scope::scope(arguments, output),
