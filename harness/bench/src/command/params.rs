@@ -14,7 +14,8 @@ use crate::rig::session::RigSession;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use std::ops::Range;
-use toml::de::{DeTable, DeValue};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
 /// What is wrong with a line of a file.
 pub enum EntryMistake {
@@ -179,50 +180,77 @@ impl<D: HeldDrives, P> ParameterFile<D, P> {
     /// # Errors
     /// Its mistakes.
     pub fn parse(&self, source: &Source) -> Result<Vec<P>, Problems> {
-        let (mut problems, mut found) = (Vec::new(), Vec::new());
-        let mut wrong = |range: Range<usize>, message: String, expected: &str| {
-            let (start, end) = (range.start, range.end);
-            problems.push(Problem::new(TextSpan { start, end }, message, expected));
-        };
-        let a_table = format!("a table [{}] expected", self.table);
-        match DeTable::parse(&source.text) {
-            Err(error) => {
-                let range = error.span().unwrap_or(0..0);
-                wrong(range, error.message().to_owned(), "TOML expected here");
-            }
-            Ok(table) => {
-                for (name, value) in table.get_ref() {
-                    match value.get_ref() {
-                        DeValue::Table(entries) if name.get_ref() == self.table => {
-                            for (key, value) in entries {
-                                match (self.entry)(key.get_ref(), value.get_ref()) {
-                                    Ok(entry) => found.push(entry),
-                                    Err(EntryMistake::Key(why)) => {
-                                        wrong(key.span(), why, self.expected[0]);
-                                    }
-                                    Err(EntryMistake::Value(why)) => {
-                                        wrong(value.span(), why, self.expected[1]);
-                                    }
-                                }
+        let Self {
+            table, expected, ..
+        } = self;
+        let (found, problems) = entries(source, table, self.no_table, |key, value| {
+            let (span, message, expected) = match (self.entry)(key.get_ref(), value.get_ref()) {
+                Ok(entry) => return Ok(entry),
+                Err(EntryMistake::Key(why)) => (key.span(), why, expected[0]),
+                Err(EntryMistake::Value(why)) => (value.span(), why, expected[1]),
+            };
+            Err(Problem::new(place(span), message, expected))
+        });
+        checked(source, found, problems)
+    }
+}
+
+/// What was read of a file, unless it has mistakes.
+///
+/// # Errors
+/// They, in the order of the file.
+pub fn checked<T>(source: &Source, read: T, mut problems: Vec<Problem>) -> Result<T, Problems> {
+    if problems.is_empty() {
+        return Ok(read);
+    }
+    problems.sort_by_key(|problem| problem.span.start);
+    Err(Problems::new(&source.name, source.text.clone(), problems))
+}
+
+/// The entries of the only table that a file has, and the mistakes of the file. `no_table` is the message for a key that has no table below it.
+pub fn entries<P>(
+    source: &Source,
+    table: &str,
+    no_table: fn(&str) -> String,
+    mut entry: impl FnMut(&Spanned<DeString<'_>>, &Spanned<DeValue<'_>>) -> Result<P, Problem>,
+) -> (Vec<P>, Vec<Problem>) {
+    let (mut problems, mut found) = (Vec::new(), Vec::new());
+    let a_table = format!("a table [{table}] expected");
+    match DeTable::parse(&source.text) {
+        Err(error) => {
+            let span = place(error.span().unwrap_or(0..0));
+            problems.push(Problem::new(span, error.message(), "TOML expected here"));
+        }
+        Ok(parsed) => {
+            for (name, value) in parsed.get_ref() {
+                let message = match value.get_ref() {
+                    DeValue::Table(entries) if name.get_ref() == table => {
+                        for (key, value) in entries {
+                            match entry(key, value) {
+                                Ok(entry) => found.push(entry),
+                                Err(problem) => problems.push(problem),
                             }
                         }
-                        DeValue::Table(_) => {
-                            let message = format!("there is no table `{}`", name.get_ref());
-                            wrong(name.span(), message, &a_table);
-                        }
-                        _ => wrong(name.span(), (self.no_table)(name.get_ref()), &a_table),
+                        continue;
                     }
-                }
+                    DeValue::Table(_) => format!("there is no table `{}`", name.get_ref()),
+                    _ => no_table(name.get_ref()),
+                };
+                problems.push(Problem::new(place(name.span()), message, &a_table));
             }
         }
-        if problems.is_empty() && found.is_empty() {
-            let span = TextSpan::default();
-            problems.push(Problem::new(span, "the file has no parameters", &a_table));
-        }
-        if problems.is_empty() {
-            return Ok(found);
-        }
-        problems.sort_by_key(|problem| problem.span.start);
-        Err(Problems::new(&source.name, source.text.clone(), problems))
+    }
+    if problems.is_empty() && found.is_empty() {
+        let span = TextSpan::default();
+        problems.push(Problem::new(span, "the file has no parameters", &a_table));
+    }
+    (found, problems)
+}
+
+/// The place of a range of bytes.
+pub const fn place(range: Range<usize>) -> TextSpan {
+    TextSpan {
+        start: range.start,
+        end: range.end,
     }
 }

@@ -9,6 +9,7 @@
 use crate::driver::cell::{CellFound, hex};
 use crate::language::argument::{MemoryKind, MemoryRange, value_at};
 use crate::language::syntax::Written;
+use harness_bench::command::params::{checked, entries, place};
 use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
 use harness_bench::scenario::source::Source;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
@@ -16,7 +17,7 @@ use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use std::ops::Range;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeValue;
 
 /// The table with the parameters.
 const TABLE: &str = "nd21";
@@ -95,14 +96,31 @@ pub(crate) fn read(
     source: &Source,
     drive: DriveUnits,
 ) -> Result<(Vec<FileParameter>, DriveUnits), Problems> {
-    let mut problems = Vec::new();
-    let written = values(source, &mut problems);
+    let known = parameters();
+    let names: Vec<_> = known
+        .iter()
+        .filter_map(|location| location.cell())
+        .map(|cell| cell.printed)
+        .collect();
+    let no_table = |key: &str| format!("`{key}` is no table");
+    let (mut written, mut problems) = entries(source, TABLE, no_table, |key, value| {
+        let (span, name) = (place(key.span()), key.get_ref());
+        let Some(at) = names.iter().position(|own| own == name) else {
+            let message = format!("`{name}` is not a parameter");
+            let expected = "a name of FF60-FF7F or of a cell with a home in the EEPROM (ND21 14.2)";
+            return Err(Problem::new(span, message, expected).did_you_mean(name, &names));
+        };
+        let value = entry(&source.text, value.span(), value.get_ref(), &known[at])?;
+        Ok((at, (known[at].clone(), value, span)))
+    });
+    written.sort_by_key(|(at, _)| *at);
+    let written: Vec<_> = written.into_iter().map(|(_, own)| own).collect();
     let units = units(&written, drive);
-    let mut entries = Vec::new();
+    let mut read = Vec::new();
     for (location, value, span) in written {
         match location.bytes(&value, units) {
             Ok(bytes) if bytes.len() == usize::from(location.size) => {
-                entries.push(FileParameter { location, bytes });
+                read.push(FileParameter { location, bytes });
             }
             Ok(_) => problems.push(Problem::new(
                 span,
@@ -112,11 +130,7 @@ pub(crate) fn read(
             Err(problem) => problems.push(problem),
         }
     }
-    if problems.is_empty() {
-        return Ok((entries, units));
-    }
-    problems.sort_by_key(|problem| problem.span.start);
-    Err(Problems::new(&source.name, source.text.clone(), problems))
+    checked(source, (read, units), problems)
 }
 
 /// With the range of speeds that the file itself sets (14.3.2).
@@ -132,61 +146,6 @@ fn units(written: &[(MemoryRange, Written, TextSpan)], drive: DriveUnits) -> Dri
         },
         _ => drive,
     }
-}
-
-/// The values of the file, as far as they can be read.
-fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Written, TextSpan)> {
-    let (document, errors) = DeTable::parse_recoverable(&source.text);
-    for error in errors {
-        let span = error.span().map_or(TextSpan::default(), place);
-        problems.push(Problem::new(span, error.message(), "TOML expected here"));
-    }
-    let known = parameters();
-    let names: Vec<_> = known
-        .iter()
-        .filter_map(|location| location.cell())
-        .map(|cell| cell.printed)
-        .collect();
-    let mut written = Vec::new();
-    for (key, value) in document.get_ref() {
-        let span = place(key.span());
-        let table = match value.get_ref() {
-            DeValue::Table(table) if key.get_ref() == TABLE => table,
-            _ => {
-                let message = format!("`{}` is not the table of the parameters", key.get_ref());
-                problems.push(Problem::new(span, message, "`[nd21]` expected here"));
-                continue;
-            }
-        };
-        for (key, value) in table {
-            let span = place(key.span());
-            let Some(at) = names.iter().position(|name| *name == key.get_ref()) else {
-                let message = format!("`{}` is not a parameter", key.get_ref());
-                let expected =
-                    "a name of FF60-FF7F or of a cell with a home in the EEPROM (ND21 14.2)";
-                let problem = Problem::new(span, message, expected);
-                problems.push(problem.did_you_mean(key.get_ref(), &names));
-                continue;
-            };
-            match entry(&source.text, value.span(), value.get_ref(), &known[at]) {
-                Ok(value) => written.push((at, value, span)),
-                Err(problem) => problems.push(problem),
-            }
-        }
-    }
-    if written.is_empty() && problems.is_empty() {
-        let message = "the file has no parameters";
-        problems.push(Problem::new(
-            TextSpan::default(),
-            message,
-            "a table [nd21] with names and values expected",
-        ));
-    }
-    written.sort_by_key(|(at, ..)| *at);
-    written
-        .into_iter()
-        .map(|(at, value, span)| (known[at].clone(), value, span))
-        .collect()
 }
 
 fn entry(
@@ -210,11 +169,4 @@ fn entry(
         span: whole,
         ..problem
     })
-}
-
-fn place(range: Range<usize>) -> TextSpan {
-    TextSpan {
-        start: range.start,
-        end: range.end,
-    }
 }
