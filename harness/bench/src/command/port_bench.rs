@@ -107,26 +107,33 @@ pub fn select<D: HeldDrives>(
     let [drive, line] = D::WORDS;
     let all = session.drives().listed();
     let of = |number: u8| all.iter().find(|own| D::number(own) == number).copied();
+    each_once(wanted, |axes| match axes {
+        Axes::All => Ok(all.clone()),
+        Axes::Some(0, numbers) => {
+            if let Some(missing) = numbers.clone().find(|own| of(*own).is_none()) {
+                let known: Vec<_> = all.iter().map(|own| D::number(own).to_string()).collect();
+                return Err(format!(
+                    "the rig has no {drive} {missing}: {} expected",
+                    known.join(", ")
+                ));
+            }
+            Ok(numbers.clone().filter_map(of).collect())
+        }
+        Axes::Some(ring, _) => Err(format!("a {line} has no ring {}", ring + 1)),
+    })
+}
+
+/// What `find` finds for each that is wanted, each once.
+///
+/// # Errors
+/// Those of `find`, in a sentence.
+pub fn each_once<T: PartialEq>(
+    wanted: &[Axes],
+    find: impl Fn(&Axes) -> Result<Vec<T>, String>,
+) -> Result<Vec<T>, Failure> {
     let mut selected = Vec::new();
     for axes in wanted {
-        let named: Vec<_> = match axes {
-            Axes::All => all.clone(),
-            Axes::Some(0, numbers) => {
-                if let Some(missing) = numbers.clone().find(|own| of(*own).is_none()) {
-                    let known: Vec<_> = all.iter().map(|own| D::number(own).to_string()).collect();
-                    return Err(Failure::refused(format!(
-                        "the rig has no {drive} {missing}: {} expected",
-                        known.join(", ")
-                    )));
-                }
-                numbers.clone().filter_map(of).collect()
-            }
-            Axes::Some(ring, _) => {
-                let message = format!("a {line} has no ring {}", ring + 1);
-                return Err(Failure::refused(message));
-            }
-        };
-        for own in named {
+        for own in find(axes).map_err(Failure::refused)? {
             if !selected.contains(&own) {
                 selected.push(own);
             }

@@ -3,42 +3,27 @@
 use crate::driver::Axis;
 use harness_bench::command::axes::Axes;
 use harness_bench::command::failure::Failure;
+use harness_bench::command::port_bench::each_once;
 
 /// The drives of a bus that are meant, each once, in the order in which they are named.
 pub(crate) fn select(wanted: &[Axes], bus: &[Axis]) -> Result<Vec<Axis>, Failure> {
-    let mut selected: Vec<Axis> = Vec::new();
-    for axes in wanted {
-        let found: Vec<Axis> = match axes {
-            Axes::All => bus.to_vec(),
-            Axes::Some(ring, drives) => {
-                let of_ring = bus.iter().filter(|axis| axis.ring() == *ring);
-                let last = of_ring.clone().map(|axis| axis.drive()).max();
-                let Some(last) = last else {
-                    return Err(Failure::refused(format!(
-                        "the bus has no ring {}",
-                        ring + 1
-                    )));
-                };
-                if *drives.end() > last {
-                    return Err(Failure::refused(format!(
-                        "there is no drive {} in a ring of {}: 0 to {last} expected (ND21 8.5)",
-                        drives.end(),
-                        u16::from(last) + 1
-                    )));
-                }
-                of_ring
-                    .filter(|axis| drives.contains(&axis.drive()))
-                    .copied()
-                    .collect()
-            }
+    each_once(wanted, |axes| {
+        let Axes::Some(ring, drives) = axes else {
+            return Ok(bus.to_vec());
         };
-        for axis in found {
-            if !selected.contains(&axis) {
-                selected.push(axis);
-            }
+        let of_ring = bus.iter().filter(|axis| axis.ring() == *ring);
+        let last = of_ring.clone().map(|axis| axis.drive()).max();
+        let last = last.ok_or_else(|| format!("the bus has no ring {}", ring + 1))?;
+        if *drives.end() > last {
+            return Err(format!(
+                "there is no drive {} in a ring of {}: 0 to {last} expected (ND21 8.5)",
+                drives.end(),
+                u16::from(last) + 1
+            ));
         }
-    }
-    Ok(selected)
+        let meant = of_ring.filter(|axis| drives.contains(&axis.drive()));
+        Ok(meant.copied().collect())
+    })
 }
 
 /// The only drive that is meant.
