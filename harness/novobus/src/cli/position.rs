@@ -10,12 +10,11 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
 use harness_bench::command::rig_name::Use;
-use harness_bench::scenario::quantity::Quantity;
 use harness_proto::nd21::bits::{self, ps_status};
 use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, UnitError, speed_from_raw, speed_to_raw};
-use indicatif::{ProgressBar, ProgressDrawTarget};
+use indicatif::ProgressBar;
 
 /// A run, settled before anything moves.
 struct Run {
@@ -101,18 +100,10 @@ fn turn(
 
 fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Result<Run, Failure> {
     let wrong = |error: UnitError| Failure::refused(error.to_string());
-    let position = |mode, quantity: Quantity| Position::from_turns(mode, quantity.value);
-    let (target, words) = match (arguments.to, arguments.by) {
-        (Some(to), _) => (
-            Some(position(PositionMode::Absolute, to)),
-            Some(format!("to {to}")),
-        ),
-        (None, Some(by)) => (
-            Some(position(PositionMode::Relative, by)),
-            Some(format!("by {by}")),
-        ),
-        (None, None) => (None, None),
-    };
+    let to = arguments.to.map(|to| (PositionMode::Absolute, "to", to));
+    let by = arguments.by.map(|by| (PositionMode::Relative, "by", by));
+    let end = to.or(by);
+    let target = end.map(|(mode, _, turns)| Position::from_turns(mode, turns.value));
     let speed = arguments
         .speed
         .map(|speed| speed_to_raw(speed.value, units.range));
@@ -127,7 +118,7 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Resul
         speed: speed.map(i16::cast_unsigned),
         reference: arguments.reference,
         init: arguments.init,
-        words,
+        words: end.map(|(_, how, turns)| format!("{how} {turns}")),
     })
 }
 
@@ -218,12 +209,8 @@ fn show(bar: &ProgressBar, cell: u16, byte: u8) {
 }
 
 fn spinner(shown: bool) -> ProgressBar {
-    let target = if shown {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let bar = ProgressBar::new_spinner();
-    bar.set_draw_target(target);
-    bar
+    match shown {
+        true => ProgressBar::new_spinner(),
+        false => ProgressBar::hidden(),
+    }
 }
