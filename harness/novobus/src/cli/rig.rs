@@ -119,9 +119,9 @@ impl OpenBench {
         }
     }
 
-    /// How many rings it has.
-    pub(crate) fn rings(&self) -> usize {
-        self.plan.rings.len()
+    /// How many drives each ring has.
+    pub(crate) fn sizes(&self) -> Vec<u8> {
+        self.plan.rings.iter().map(|ring| ring.drives()).collect()
     }
 
     /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from

@@ -9,7 +9,7 @@ use harness_bench::command::drive::TopArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
-use harness_bench::command::rig_name::{RigName, Use};
+use harness_bench::command::rig_name::Use;
 use harness_bench::command::top::{RateWindow, TopReader, TopScene, check, live, once};
 use harness_bench::counted::counted;
 use harness_bench::rig::file::Ring;
@@ -55,16 +55,8 @@ const CELLS: [(u16, Width); 9] = [
 /// Shows drives until a key ends it.
 pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit, Failure> {
     check(arguments, output)?;
-    let name = match &arguments.rig.rig {
-        Some(RigName::Named(name)) => name.clone(),
-        Some(RigName::Simulated(sizes)) => {
-            let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
-            format!("sim:{}", sizes.join(","))
-        }
-        None => "sim:3".to_owned(),
-    };
     rig::on(&arguments.rig, Use::look("top"), output, |bench, output| {
-        let (heading, title) = heading(&name, bench);
+        let (heading, title) = heading(bench);
         let heard = HeardLinks::of(bench);
         let heard = heard.ok_or_else(|| Failure::refused("the rig has been given back"))?;
         let scene = TopScene {
@@ -84,14 +76,8 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
 }
 
 /// The heading of the page, and its title in a browser.
-fn heading(name: &str, bench: &OpenBench) -> (Heading, String) {
-    let mut sizes = Vec::new();
-    for axis in bench.bus.axes() {
-        match sizes.get_mut(axis.ring()) {
-            Some(size) => *size += 1,
-            None => sizes.push(1),
-        }
-    }
+fn heading(bench: &OpenBench) -> (Heading, String) {
+    let sizes = bench.sizes();
     let places = bench.with_rig(|session| {
         let rings = session.rig().rings();
         let place = |ring: &Ring| {
@@ -105,8 +91,11 @@ fn heading(name: &str, bench: &OpenBench) -> (Heading, String) {
             rings.map(|(_, ring)| place(ring)).collect(),
         )
     });
-    let (rig, places): (String, Vec<String>) =
-        places.unwrap_or_else(|| (name.to_owned(), vec!["simulated".to_owned(); sizes.len()]));
+    let (rig, places): (String, Vec<String>) = places.unwrap_or_else(|| {
+        let names: Vec<_> = sizes.iter().map(u8::to_string).collect();
+        let places = vec!["simulated".to_owned(); sizes.len()];
+        (format!("sim:{}", names.join(",")), places)
+    });
     let rings = sizes.iter().zip(places);
     let rings: Vec<_> = rings
         .map(|(size, place)| format!("{}, {place}", counted(*size, "drive")))
@@ -200,7 +189,7 @@ impl TopReader for Reader<'_> {
         let bus = &self.bench.bus;
         for (ring, event) in bus.take_events() {
             if let Event::Disturbed { fault, .. } = event {
-                into.disturbed(match self.bench.rings() {
+                into.disturbed(match self.bench.sizes().len() {
                     1 => fault.to_string(),
                     _ => format!("ring {}: {fault}", ring + 1),
                 });

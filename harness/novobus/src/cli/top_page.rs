@@ -16,7 +16,7 @@ impl HeardLinks {
     /// The links of a bench that are heard; `None` where it has been given back.
     pub(super) fn of(bench: &OpenBench) -> Option<Self> {
         bench.with_link(|link| {
-            let sizes: Vec<u8> = (0..bench.rings()).map(|ring| link.drives(ring)).collect();
+            let sizes = bench.sizes();
             let all = sizes.iter().enumerate();
             let all = all.flat_map(|(ring, drives)| {
                 (0..=usize::from(*drives)).map(move |place| (ring, place))
