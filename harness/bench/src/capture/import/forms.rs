@@ -10,42 +10,13 @@
 //! | Kvaser's text | `0 00000201 3 3D 40 00 154.266550 R`, in hexadecimal |
 //! | CANHacker | `17,123 201 3 3D 40 00`; the time begins again each minute |
 
-use super::logs::{Form, State, frame, identifier, logged, shows};
+use super::logs::{State, frame, identifier, logged, shows};
 use super::numbers::{Time, seconds};
 use super::table::first_line;
 use crate::capture::frames::{LogEntry, LogItem};
 
 /// Units of a second.
 const SECOND: Time = 3_000_000_000;
-
-pub(super) const TRC: Form = Form {
-    line: trc,
-    wraps: None,
-};
-pub(super) const GVRET: Form = Form {
-    line: gvret,
-    wraps: None,
-};
-pub(super) const BUSMASTER: Form = Form {
-    line: busmaster,
-    wraps: Some(86_400 * SECOND),
-};
-pub(super) const CRTD: Form = Form {
-    line: crtd,
-    wraps: None,
-};
-pub(super) const PRINTED: Form = Form {
-    line: printed,
-    wraps: None,
-};
-pub(super) const KVASER: Form = Form {
-    line: kvaser,
-    wraps: None,
-};
-pub(super) const CANHACKER: Form = Form {
-    line: canhacker,
-    wraps: Some(60 * SECOND),
-};
 
 /// The words of the first line that is not empty.
 fn begins(bytes: &[u8], words: &[&str]) -> bool {
@@ -95,7 +66,7 @@ fn stated(text: &str) -> Result<usize, String> {
 }
 
 /// N number, O time in milliseconds, B bus, T type, d direction or type, I identifier, R reserved, l or L length, D data.
-fn trc(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn trc(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     if let Some(heading) = line.strip_prefix(';') {
         if let Some(version) = heading.strip_prefix("$FILEVERSION=") {
             let columns = match version.trim() {
@@ -148,7 +119,7 @@ fn trc(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     Ok(Some(logged(channel, Some(at), LogItem::Frame(frame))))
 }
 
-fn gvret(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn gvret(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     if line.starts_with("Time Stamp") {
         line.clone_into(&mut state.columns);
         return Ok(None);
@@ -176,7 +147,8 @@ fn gvret(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     Ok(Some(logged(field("Bus"), Some(at), what)))
 }
 
-fn busmaster(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn busmaster(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+    state.wraps = Some(86_400 * SECOND);
     if let Some(heading) = line.strip_prefix("***") {
         match heading.trim_end_matches('*') {
             "DEC" => state.radix = 10,
@@ -232,7 +204,7 @@ fn crtd_kind(kind: &str) -> Option<(&str, bool)> {
     }
 }
 
-fn crtd(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn crtd(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let (time, kind, rest) = match words.as_slice() {
         [time, kind, rest @ ..] => (*time, *kind, rest),
@@ -255,7 +227,7 @@ fn crtd(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     Ok(Some(logged(bus, Some(at), LogItem::Frame(frame))))
 }
 
-fn printed(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn printed(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let behind = |name: &str| {
         let at = words.iter().position(|word| *word == name)?;
@@ -282,7 +254,7 @@ fn printed(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     Ok(Some(logged(channel, Some(at), what)))
 }
 
-fn kvaser(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn kvaser(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [channel, id, rest @ .., time, "R" | "T"] = words.as_slice() else {
         return match words.first() {
@@ -313,7 +285,8 @@ fn kvaser(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     Ok(Some(logged(channel, Some(at), LogItem::Frame(frame))))
 }
 
-fn canhacker(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn canhacker(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+    state.wraps = Some(60 * SECOND);
     let words: Vec<&str> = line.split_whitespace().collect();
     let [time, id, length, data @ ..] = words.as_slice() else {
         return Err("17,123 201 3 3D 40 00 is expected".to_owned());

@@ -18,17 +18,9 @@ use harness_proto::can::{Frame, Id};
 /// The number of lines in which to look for a frame after headings.
 const HEADING: usize = 4_096;
 
-pub(super) struct Form {
-    /// Reads a line; `None` for one that has no frame.
-    pub(super) line: fn(&mut State, &str) -> Result<Option<LogEntry>, String>,
-    /// After how long its clock begins again.
-    pub(super) wraps: Option<Time>,
-}
+/// Reads a line of a log; `None` for one that has no frame.
+pub(super) type ReadLine = fn(&mut State, &str) -> Result<Option<LogEntry>, String>;
 
-pub(super) const CANDUMP: Form = Form {
-    line: candump,
-    wraps: None,
-};
 /// What is known from the lines so far.
 pub(super) struct State {
     /// A frame has been read.
@@ -40,6 +32,8 @@ pub(super) struct State {
     pub(super) radix: u32,
     /// Each time counts from the frame before.
     pub(super) relative: bool,
+    /// After how long its clock begins again.
+    pub(super) wraps: Option<Time>,
     /// A line was in the form of the screen.
     screen: bool,
     /// The log says that frames are missing.
@@ -50,7 +44,7 @@ pub(super) struct State {
 ///
 /// # Errors
 /// A line that cannot be.
-pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
+pub(super) fn read(bytes: &[u8], read_line: ReadLine) -> Result<Log, CaptureError> {
     let text = String::from_utf8_lossy(bytes);
     let mut state = State {
         begun: false,
@@ -58,6 +52,7 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         columns: String::new(),
         radix: 16,
         relative: false,
+        wraps: None,
         screen: false,
         lost: None,
     };
@@ -69,7 +64,7 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         if line.is_empty() {
             continue;
         }
-        match (form.line)(&mut state, line) {
+        match read_line(&mut state, line) {
             Ok(None) => {}
             Ok(Some(logged)) => {
                 if let Some((error, _)) = behind {
@@ -120,7 +115,7 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
             logged.at = logged.at.map(|_| at);
         }
     }
-    if let Some(period) = form.wraps {
+    if let Some(period) = state.wraps {
         unwrap_times(&mut log.frames, period);
     }
     Ok(log)
@@ -288,7 +283,7 @@ fn length(word: &str) -> Option<&str> {
     (digits && (1..=3).contains(&inner.len())).then_some(inner)
 }
 
-fn candump(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
+pub(super) fn candump(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     const FORM: &str = "(1436509052.249713) can0 201#3D4000 is expected, as candump -L writes it";
     if line.starts_with('#') || line.starts_with("^C") {
         return Ok(None);

@@ -153,18 +153,18 @@ fn first(bytes: &[u8]) -> Option<u8> {
 /// The log of candump, with `-L` or on the screen.
 const CANDUMP: &str = "log of candump";
 
-/// A log of frames as text: its name, by what it is recognised, and its form.
+/// A log of frames as text: its name, what recognises it, and what reads a line of it.
 macro_rules! log {
-    ($name:expr, $recognised:expr, $form:expr) => {
+    ($name:expr, $recognised:expr, $line:expr) => {
         whole($name, $recognised, |bytes, settings| {
-            frames::of_log(logs::read(bytes, &$form)?, &settings.links)
+            frames::of_log(logs::read(bytes, $line)?, &settings.links)
         })
         .of(Parts::Lines)
     };
 }
 
 /// The formats; a file is of the first one that recognises it.
-const FORMATS: [Format; 25] = [
+const FORMATS: &[Format] = &[
     whole(
         "pcapng (Wireshark)",
         |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
@@ -205,20 +205,20 @@ const FORMATS: [Format; 25] = [
         frames::of_log(asc::read(bytes)?, &settings.links)
     })
     .of(Parts::Lines),
-    log!("TRC (PEAK)", forms::is_trc, forms::TRC),
+    log!("TRC (PEAK)", forms::is_trc, forms::trc),
     log!(
         "csv of frames (GVRET, SavvyCAN)",
         forms::is_gvret,
-        forms::GVRET
+        forms::gvret
     ),
-    log!("log of BUSMASTER", forms::is_busmaster, forms::BUSMASTER),
+    log!("log of BUSMASTER", forms::is_busmaster, forms::busmaster),
     log!(
         "text of frames (python-can)",
         forms::is_printed,
-        forms::PRINTED
+        forms::printed
     ),
-    log!("text of frames (Kvaser)", forms::is_kvaser, forms::KVASER),
-    log!("trace of CANHacker", forms::is_canhacker, forms::CANHACKER),
+    log!("text of frames (Kvaser)", forms::is_kvaser, forms::kvaser),
+    log!("trace of CANHacker", forms::is_canhacker, forms::canhacker),
     channels("VCD", vcd::recognised, |bytes, _| vcd::read(bytes)).of(Parts::Words),
     channels(
         "binary levels (Saleae Logic)",
@@ -259,15 +259,15 @@ const FORMATS: [Format; 25] = [
         |bytes, _| saleae::levels(bytes),
     )
     .of(Parts::Lines),
-    log!("CRTD (OVMS)", forms::is_crtd, forms::CRTD),
-    log!(CANDUMP, logs::is_candump, logs::CANDUMP),
+    log!("CRTD (OVMS)", forms::is_crtd, forms::crtd),
+    log!(CANDUMP, logs::is_candump, logs::candump),
 ];
 
 /// The formats of which parts follow each other in one text: sections of pcapng, lines of a log.
 const JOINED: [&str; 2] = ["pcapng (Wireshark)", CANDUMP];
 
 /// Formats that are not read, by their first bytes, with what to do instead. Each command has been tried.
-const FOREIGN: [(&[u8], &str); 13] = [
+const FOREIGN: &[(&[u8], &str)] = &[
     (
         b"PK\x03\x04",
         "a zip archive, as .sal and .sr files are; export the levels from Logic as csv or binary, or write a VCD with `sigrok-cli -i \
