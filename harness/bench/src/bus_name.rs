@@ -12,7 +12,7 @@ pub enum BusName {
 }
 
 impl BusName {
-    /// The names in a scenario.
+    /// The names in a scenario, in the order of the variants.
     pub const NAMES: [(&'static str, Self); 3] = [
         ("novobus", Self::Novobus),
         ("unitek", Self::Unitek),
@@ -25,10 +25,6 @@ impl BusName {
     /// The name in a scenario, and of its folders in `corpora/scenarios` and `snapshots/scenarios`.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Novobus => "novobus",
-            Self::Unitek => "unitek",
-            Self::Nordac => "nordac",
-        }
+        Self::NAMES[self as usize].0
     }
 }
