@@ -1,6 +1,7 @@
 //! What no compiler keeps: import directions, citations that resolve, a snapshot for each scenario and no
 //! orphan, no over-long file.
 
+use super::crates::BUS_FOLDERS;
 use harness::buses::BUSES;
 use harness::library::Entry;
 use harness::manual::NOT_YET;
@@ -277,15 +278,9 @@ fn a_name_is_one_type() {
         if tests.iter().any(|ending| place.ends_with(ending)) {
             continue;
         }
-        let buses = [
-            ("/unitek/", "unitek"),
-            ("/novobus/", "novobus"),
-            ("/nd21/", "novobus"),
-            ("/profibus/", "nordac"),
-            ("/nordac/", "nordac"),
-        ];
-        let bus = buses.iter().find(|(folder, _)| place.contains(folder));
-        let bus = bus.map_or("rooms", |(_, bus)| *bus);
+        let of = |folder: &&str| place.contains(&format!("/{folder}/"));
+        let bus = BUS_FOLDERS.iter().find(|folders| folders.iter().any(of));
+        let bus = bus.map_or("rooms", |folders| folders[0]);
         for line in read(&path).lines() {
             let words = line
                 .strip_prefix("pub ")
