@@ -1,179 +1,251 @@
-//! Shrinks a conversation of acts: as long as the same kind of difference remains, acts are dropped, and times and values are lowered.
+//! Shrinks a finding: removes what is not needed to reproduce it and simplifies the rest.
+//!
+//! Every accepted step lowers the measure of the conversation, so shrinking ends. The order of the steps is fixed, so the result is
+//! reproducible. On hardware the runs dominate the cost, so the steps that remove most come first: everything after the difference, then
+//! acts, drives, and at last parts of acts, time and values.
 
 use super::target::Target;
 use super::{Differing as _, ExploreError, Finding, FuzzCase};
+use std::collections::BTreeSet;
+use std::ops::Range;
 
-/// A conversation of acts with times between them.
-pub trait Acts: FuzzCase {
+/// A conversation that can be shrunk.
+pub trait Shrinkable: FuzzCase {
+    /// Orders conversations by size.
+    type Measure: Ord;
+
+    /// How many acts are left at first where runs of acts are left out, long runs first.
+    const FIRST_LEFT: usize = 0;
+
+    fn measure(&self) -> Self::Measure;
+
     fn acts(&mut self) -> &mut Vec<Self::Act>;
-
-    /// The time after an act, in microseconds.
-    fn wait(act: &mut Self::Act) -> &mut u64;
 
     /// Acts that may show the same, the smallest first.
     fn simpler(act: &Self::Act) -> Vec<Self::Act>;
 
-    /// Orders conversations by size.
-    fn measure(&self) -> (usize, u64, u64);
+    /// The conversation without these acts, in one way or in several.
+    fn without(&self, acts: Range<usize>) -> Vec<Self> {
+        let mut rest = self.clone();
+        drop(rest.acts().drain(acts));
+        vec![rest]
+    }
+
+    /// The conversation up to a difference, the shortest first.
+    fn up_to(&self, _: &Self::Difference) -> Vec<Self> {
+        Vec::new()
+    }
+
+    /// Subjects with simpler drives, or with another simplification of several acts.
+    fn reduced(_: &Subject<Self>) -> Vec<Subject<Self>> {
+        Vec::new()
+    }
 }
 
-/// The result of shrinking a finding.
+/// What is shrunk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Subject<C: FuzzCase> {
+    pub case: C,
+    /// What its drives are made of.
+    pub setup: C::Setup,
+}
+
+/// The result of shrinking.
 #[derive(Clone, Debug)]
-pub(crate) struct Smaller<C: FuzzCase> {
-    pub finding: Finding<C>,
-    /// Whether nothing more can be taken away.
+pub struct ShrinkOutcome<C: FuzzCase> {
+    /// The smallest subject found.
+    pub subject: Subject<C>,
+    /// How its drives differ from the expected behaviour.
+    pub difference: C::Difference,
+    pub runs: u32,
+    /// Whether nothing more could be removed; false if the limit of runs was reached first.
     pub complete: bool,
 }
 
-/// Makes a finding small, in at most `most` runs on `target`.
+/// A shrunk finding.
+#[derive(Clone, Debug)]
+pub(crate) struct Smaller<C: FuzzCase> {
+    pub finding: Finding<C>,
+    /// Whether nothing more could be removed.
+    pub complete: bool,
+}
+
+/// Numbers of repetitions to try in place of `count`, the smallest first.
+pub fn fewer(count: u8) -> impl Iterator<Item = u8> {
+    let tried = [1, count / 2, count - count / 4, count.saturating_sub(1)].into_iter();
+    tried.filter(move |fewer| (1..count).contains(fewer))
+}
+
+/// Shrinks a finding in at most `most` runs on `target`.
 ///
 /// # Errors
 /// The target fails.
-pub(crate) fn smaller<C: Acts>(
+pub(crate) fn smaller<C: Shrinkable>(
     finding: &Finding<C>,
     target: &mut dyn Target<C>,
     most: u32,
 ) -> Result<Smaller<C>, ExploreError> {
-    let mut shrinker = Shrinker {
-        target,
-        best: finding.case.clone(),
-        difference: finding.difference.clone(),
-        runs: 0,
-        most,
+    let subject = Subject {
+        case: finding.case.clone(),
+        setup: finding.setup.clone(),
     };
-    loop {
-        let before = shrinker.best.measure();
-        shrinker.leave_out()?;
-        shrinker.hurry()?;
-        shrinker.simplify()?;
-        if shrinker.best.measure() == before || shrinker.is_spent() {
-            break;
+    let (mut runs, mut spent) = (0, false);
+    let mut ask = |subject: &Subject<C>| {
+        spent |= runs >= most || target.over().is_some();
+        if spent {
+            return Ok(None);
         }
-    }
+        let rehearsal = target.rehearse(&subject.case)?;
+        if rehearsal.denied.is_some() {
+            return Ok(None);
+        }
+        runs += 1;
+        target.begin();
+        Ok(target.attempt(&subject.case, &rehearsal)?.difference)
+    };
+    let small = shrink(subject, finding.difference.clone(), u32::MAX, &mut ask)?;
     Ok(Smaller {
-        complete: !shrinker.is_spent(),
+        complete: !spent,
         finding: Finding {
-            shrunk_in: Some(shrinker.runs),
-            difference: shrinker.difference,
-            case: shrinker.best,
+            shrunk_in: Some(runs),
+            difference: small.difference,
+            case: small.subject.case,
             ..finding.clone()
         },
     })
 }
 
-struct Shrinker<'t, C: FuzzCase> {
-    target: &'t mut dyn Target<C>,
-    best: C,
+/// Tries a subject and returns how its drives differ from the expected behaviour, or `None` if they do not.
+pub type SubjectJudge<'a, C> =
+    dyn FnMut(&Subject<C>) -> Result<Option<<C as FuzzCase>::Difference>, ExploreError> + 'a;
+
+/// Shrinks a subject in at most `most_runs` runs. The result differs in the same way as `difference`.
+///
+/// # Errors
+/// A run is not possible.
+pub fn shrink<C: Shrinkable>(
+    subject: Subject<C>,
     difference: C::Difference,
-    runs: u32,
-    most: u32,
+    most_runs: u32,
+    ask: &mut SubjectJudge<'_, C>,
+) -> Result<ShrinkOutcome<C>, ExploreError> {
+    let mut shrinker = Shrinker {
+        best: subject,
+        first: difference.clone(),
+        difference,
+        tried: BTreeSet::new(),
+        runs: 0,
+        most_runs,
+        ask,
+    };
+    loop {
+        let before = shrinker.best.case.measure();
+        shrinker.pass()?;
+        if shrinker.is_spent() || shrinker.best.case.measure() == before {
+            break;
+        }
+    }
+    Ok(ShrinkOutcome {
+        complete: !shrinker.is_spent(),
+        subject: shrinker.best,
+        difference: shrinker.difference,
+        runs: shrinker.runs,
+    })
 }
 
-impl<C: Acts> Shrinker<'_, C> {
-    fn is_spent(&mut self) -> bool {
-        self.runs >= self.most || self.target.over().is_some()
+struct Shrinker<'a, 'b, C: FuzzCase> {
+    best: Subject<C>,
+    first: C::Difference,
+    difference: C::Difference,
+    /// Subjects already tried.
+    tried: BTreeSet<String>,
+    runs: u32,
+    most_runs: u32,
+    ask: &'a mut SubjectJudge<'b, C>,
+}
+
+impl<C: Shrinkable> Shrinker<'_, '_, C> {
+    const fn is_spent(&self) -> bool {
+        self.runs >= self.most_runs
     }
 
-    /// Takes a smaller case if it shows the same kind of difference.
-    fn offer(&mut self, case: C) -> Result<bool, ExploreError> {
-        if case.measure() >= self.best.measure() || self.is_spent() {
+    /// Tries a smaller candidate and accepts it if it shows the same kind of difference.
+    fn offer(&mut self, mut candidate: Subject<C>) -> Result<bool, ExploreError> {
+        let smaller = candidate.case.measure() < self.best.case.measure();
+        if !smaller || candidate.case.acts().is_empty() || self.is_spent() {
             return Ok(false);
         }
-        let rehearsal = self.target.rehearse(&case)?;
-        if rehearsal.denied.is_some() {
+        if !self.tried.insert(format!("{candidate:?}")) {
             return Ok(false);
         }
         self.runs += 1;
-        self.target.begin();
-        let tried = self.target.attempt(&case, &rehearsal)?;
-        let found = tried.difference;
-        let Some(difference) = found.filter(|found| found.is_like(&self.difference)) else {
-            return Ok(false);
-        };
-        self.difference = difference;
-        self.best = case;
-        Ok(true)
-    }
-
-    /// Offers the case with one act changed.
-    fn change(
-        &mut self,
-        at: usize,
-        change: impl FnOnce(&mut C::Act),
-    ) -> Result<bool, ExploreError> {
-        let mut case = self.best.clone();
-        if let Some(act) = case.acts().get_mut(at) {
-            change(act);
+        match (self.ask)(&candidate)? {
+            Some(difference) if difference.is_like(&self.first) => {
+                self.difference = difference;
+                self.best = candidate;
+                Ok(true)
+            }
+            _ => Ok(false),
         }
-        self.offer(case)
     }
 
-    fn count(&mut self) -> usize {
-        self.best.acts().len()
+    /// Offers the candidates that `of` makes of the best subject. After each accepted one, `of` makes the rest from the new best subject.
+    fn offer_each(
+        &mut self,
+        of: impl Fn(&mut Subject<C>, &C::Difference) -> Vec<Subject<C>>,
+    ) -> Result<(), ExploreError> {
+        let mut at = 0;
+        while let Some(candidate) = of(&mut self.best, &self.difference).into_iter().nth(at) {
+            at += usize::from(!self.offer(candidate)?);
+        }
+        Ok(())
     }
 
-    /// Drops acts, long runs of them first. Their time is dropped too, or added to the act before them.
-    fn leave_out(&mut self) -> Result<(), ExploreError> {
-        let mut length = self.count();
+    fn pass(&mut self) -> Result<(), ExploreError> {
+        let with = |best: &Subject<C>, case| Subject {
+            case,
+            setup: best.setup.clone(),
+        };
+        self.offer_each(|best, difference| {
+            let cut = best.case.up_to(difference).into_iter();
+            cut.map(|case| with(best, case)).collect()
+        })?;
+        let mut length = self.count().saturating_sub(C::FIRST_LEFT);
         while length > 0 {
             let mut from = 0;
             while from < self.count() {
                 let to = (from + length).min(self.count());
-                let mut dropped = self.best.clone();
-                let gone: u64 = dropped
-                    .acts()
-                    .drain(from..to)
-                    .map(|mut act| *C::wait(&mut act))
-                    .sum();
-                let mut waits = dropped.clone();
-                if let Some(act) = from.checked_sub(1).and_then(|at| waits.acts().get_mut(at)) {
-                    *C::wait(act) += gone;
-                }
-                if !self.offer(dropped)? && !self.offer(waits)? {
-                    from += length;
-                }
-            }
-            length /= 2;
-        }
-        Ok(())
-    }
-
-    /// Lowers waits: to none, to that of a reply, to whole milliseconds, by halves.
-    fn hurry(&mut self) -> Result<(), ExploreError> {
-        for at in 0..self.count() {
-            let Some(waited) = self.best.acts().get_mut(at).map(|act| *C::wait(act)) else {
-                break;
-            };
-            let round = waited / 1_000 * 1_000;
-            let steps = [0, 1_000, 2_000, 5_000, 10_000, 50_000, waited / 2, round];
-            for wait in steps.into_iter().filter(|wait| *wait < waited) {
-                if self.change(at, |act| *C::wait(act) = wait)? {
-                    break;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Replaces acts by simpler ones.
-    fn simplify(&mut self) -> Result<(), ExploreError> {
-        for at in 0..self.count() {
-            loop {
-                let Some(act) = self.best.acts().get(at).cloned() else {
-                    break;
-                };
-                let mut taken = false;
-                for simpler in C::simpler(&act) {
-                    taken = self.change(at, |act| *act = simpler)?;
-                    if taken {
+                let mut dropped = false;
+                for case in self.best.case.without(from..to) {
+                    dropped = self.offer(with(&self.best, case))?;
+                    if dropped {
                         break;
                     }
                 }
-                if !taken {
-                    break;
+                if !dropped {
+                    from += length;
                 }
             }
+            length = (length / 2).min(self.count());
+        }
+        self.offer_each(|best, _| C::reduced(best))?;
+        let mut at = 0;
+        while at < self.count() {
+            self.offer_each(|best, _| {
+                let simpler = C::simpler(&best.case.acts()[at]).into_iter();
+                let changed = simpler.map(|act| {
+                    let mut case = best.case.clone();
+                    case.acts()[at] = act;
+                    with(best, case)
+                });
+                changed.collect()
+            })?;
+            at += 1;
         }
         Ok(())
+    }
+
+    fn count(&mut self) -> usize {
+        self.best.case.acts().len()
     }
 }

@@ -311,7 +311,7 @@ impl Case {
     }
 
     /// How many bytes are sent.
-    fn length(&self) -> usize {
+    pub(super) fn length(&self) -> usize {
         self.acts.iter().map(|act| act.length(self.drives)).sum()
     }
 
@@ -359,48 +359,6 @@ impl Case {
         self.acts.len() <= MOST_ACTS * times
             && self.length() <= MOST_BYTES * times
             && self.sizes().iter().all(is_ring)
-    }
-
-    /// What stands in it, for shrinking: every step makes this smaller. In order of weight: bytes on the wire, faults, acts,
-    /// drives, milliseconds of silence, and the values themselves.
-    #[must_use]
-    pub(crate) fn measure(&self) -> [u64; 6] {
-        let damages = self.acts.iter().flat_map(|act| &act.damages);
-        let values = self.acts.iter().map(|act| values(&act.what)).sum();
-        let waits = self.acts.iter().map(|act| match act.what {
-            ActKind::Wait(ms) => u64::from(ms),
-            _ => 0,
-        });
-        [
-            self.length() as u64,
-            damages.map(|damage| damage.harm.weight()).sum(),
-            self.acts.len() as u64,
-            self.sizes().into_iter().map(u64::from).sum(),
-            waits.sum(),
-            values,
-        ]
-    }
-}
-
-/// The sum of the values of an act.
-fn values(what: &ActKind) -> u64 {
-    let of_bytes = |bytes: &[u8]| bytes.iter().map(|byte| u64::from(*byte)).sum::<u64>();
-    match what {
-        ActKind::Bytes(bytes) => of_bytes(bytes),
-        ActKind::Power { drive, .. } => u64::from(*drive),
-        ActKind::Talk(talk) => {
-            let to = match talk.to {
-                To::Drive(drive) => u64::from(drive),
-                To::Nobody(byte) => u64::from(byte),
-                To::Same | To::Next => 0,
-            };
-            let orders = talk.orders.iter().map(|order| {
-                let spoil = order.spoil.map_or(0, |spoil| 1 + u64::from(spoil.byte));
-                of_bytes(&order.command.head()) + spoil
-            });
-            to + talk.process_data.map_or(0, u64::from) + orders.sum::<u64>()
-        }
-        _ => 0,
     }
 }
 

@@ -4,7 +4,7 @@ use super::generate::Maker;
 use super::text::text;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
 use crate::explore::promote::Promotes;
-use crate::explore::smaller::Acts;
+use crate::explore::smaller::{Shrinkable, fewer};
 use crate::explore::{
     Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
     Pool, Rehearsal, Swarm, Target, played_again,
@@ -12,6 +12,7 @@ use crate::explore::{
 use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Nothing: simulated drives do the same again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -119,29 +120,50 @@ impl<B: LineBus> Promotes for LineTalk<B> {
     }
 }
 
-impl<B: LineBus> Acts for LineTalk<B> {
+impl<B: LineBus> Shrinkable for LineTalk<B> {
+    /// Acts with their repetitions, then their contents, then time.
+    type Measure = (usize, u64, u64);
+
+    fn measure(&self) -> (usize, u64, u64) {
+        let acts = self.acts.iter().map(|act| usize::from(act.times));
+        let weights = self.acts.iter().map(|act| B::weight(&act.what));
+        let time = self.acts.iter().map(LineAct::lasts);
+        (acts.sum(), weights.sum(), time.sum())
+    }
+
     fn acts(&mut self) -> &mut Vec<Self::Act> {
         &mut self.acts
     }
 
-    fn wait(act: &mut Self::Act) -> &mut u64 {
-        &mut act.wait_us
-    }
-
     fn simpler(act: &Self::Act) -> Vec<Self::Act> {
-        let fewer = [1, act.times / 2, act.times.saturating_sub(1)].into_iter();
-        let fewer = fewer.filter(|times| (1..act.times).contains(times));
-        let fewer = fewer.map(|times| LineAct {
+        // To no wait, to that for a reply, to whole milliseconds.
+        let waited = act.wait_us;
+        let round = waited / 1_000 * 1_000;
+        let waits = [0, 1_000, 2_000, 5_000, 10_000, 50_000, waited / 2, round].into_iter();
+        let waits = waits.map(|wait_us| LineAct {
+            wait_us,
+            ..act.clone()
+        });
+        let fewer = fewer(act.times).map(|times| LineAct {
             times,
             ..act.clone()
         });
         let others = B::simpler(&act.what).into_iter();
-        fewer
+        waits
+            .chain(fewer)
             .chain(others.map(|what| LineAct { what, ..*act }))
             .collect()
     }
 
-    fn measure(&self) -> (usize, u64, u64) {
-        Self::measure(self)
+    /// The time of these acts is dropped too, or added to the act before them.
+    fn without(&self, acts: Range<usize>) -> Vec<Self> {
+        let before = acts.start.checked_sub(1);
+        let mut dropped = self.clone();
+        let gone: u64 = dropped.acts.drain(acts).map(|act| act.wait_us).sum();
+        let mut waits = dropped.clone();
+        if let Some(act) = before.and_then(|at| waits.acts.get_mut(at)) {
+            act.wait_us += gone;
+        }
+        vec![dropped, waits]
     }
 }

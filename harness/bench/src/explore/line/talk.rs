@@ -79,7 +79,7 @@ impl<W> LineAct<W> {
     }
 
     /// The time after all its repetitions together, in microseconds.
-    const fn lasts(&self) -> u64 {
+    pub(super) const fn lasts(&self) -> u64 {
         self.wait_us.saturating_mul(self.times as u64)
     }
 }
@@ -111,15 +111,6 @@ impl<B: LineBus> LineTalk<B> {
     pub fn cut(&mut self, room: usize) {
         self.acts.truncate(MOST_ACTS.saturating_sub(room));
         while !self.is_bounded() && self.acts.pop().is_some() {}
-    }
-
-    /// The size of a conversation: acts with their repetitions, then their contents, then time.
-    #[must_use]
-    pub fn measure(&self) -> (usize, u64, u64) {
-        let acts = self.acts.iter().map(|act| usize::from(act.times));
-        let weights = self.acts.iter().map(|act| B::weight(&act.what));
-        let time = self.acts.iter().map(LineAct::lasts);
-        (acts.sum(), weights.sum(), time.sum())
     }
 }
 

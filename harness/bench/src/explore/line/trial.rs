@@ -4,7 +4,7 @@
 use super::{
     LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
 };
-use crate::explore::smaller::smaller;
+use crate::explore::smaller::{Shrinkable as _, smaller};
 use crate::explore::{
     Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd,
     Spiced, Swarm, Watcher,

@@ -7,6 +7,7 @@ use crate::explore::{scenario, sources};
 use crate::language::read::RingScenario;
 use crate::simulate::simulated;
 use harness_bench::explore::promote::{Naming, checkout, promote};
+use harness_bench::explore::smaller::Shrinkable as _;
 use harness_bench::explore::{ExploreError, Target};
 use harness_bench::link::Link as _;
 use harness_bench::scenario::run::run;
@@ -156,7 +157,7 @@ fn shrinking_needs_few_runs() {
     next-drive-is-same-drive: 84 bytes became 11 in 18 runs
     ignores-parity-errors: 23 bytes became 7 in 22 runs
     counts-7-zeros: 84 bytes became 29 in 27 runs
-    time-out-after-25ms: 84 bytes became 12 in 31 runs
+    time-out-after-25ms: 84 bytes became 12 in 32 runs
     read-long-reversed: 59 bytes became 14 in 14 runs
     ");
 }
