@@ -3,6 +3,7 @@
 use super::confirm::Confirmation;
 use super::{ExploreError, Finding, FuzzSettings, Pool, Rehearsal, Swarm, Target};
 use crate::explore::Dice;
+use crate::manual::Manual;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -50,6 +51,9 @@ pub enum JudgedAgain {
 pub trait FuzzCase:
     Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned + 'static
 {
+    /// The manual of its bus.
+    const MANUAL: Manual;
+
     /// What conversations of a run may have, and with what drives.
     type Scope: Clone + Debug;
     /// What the simulated drives are made of.
@@ -86,11 +90,44 @@ pub trait FuzzCase:
     /// Which drives it is with, 0 or 1; cases with different ones are not mixed.
     fn lane(&self) -> usize;
 
-    /// The scenario of a finding.
+    /// How the drives of a finding differ, in words for a title.
+    fn kind(finding: &Finding<Self>) -> String {
+        finding.difference.signature()
+    }
+
+    /// The title of a finding.
+    fn title(finding: &Finding<Self>) -> String {
+        format!("Found by fuzzing: {}", Self::kind(finding))
+    }
+
+    /// The scenario of a finding, with this title and this table of the manual, or that of the finding. On `deviating` drives, which have the
+    /// planted deviations, it fails where the difference reaches the master.
     ///
     /// # Errors
     /// The model cannot be made.
-    fn text(finding: &Finding<Self>) -> Result<String, ExploreError>;
+    fn scenario(
+        finding: &Finding<Self>,
+        title: &str,
+        source: Option<&str>,
+        deviating: bool,
+    ) -> Result<String, ExploreError>;
+
+    /// The scenario as it stands beside the finding.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    fn text(finding: &Finding<Self>) -> Result<String, ExploreError> {
+        Self::scenario(finding, &Self::title(finding), None, false)
+    }
+
+    /// Whether a deviation was planted in drives of these.
+    fn deviates(setup: &Self::Setup) -> bool;
+
+    /// The folder and the text of an input of the fuzz targets; `None` where the bus has none.
+    fn input(finding: &Finding<Self>, title: &str) -> Option<(&'static str, String)> {
+        let _no_input = (finding, title);
+        None
+    }
 
     /// Judges a finding again: on simulated drives it is played again, on a rig with ports its attempts are in its file. `known` says how
     /// often each difference was found before, by its key.

@@ -2,7 +2,7 @@
 //! repository.
 
 use super::files::write_whole;
-use super::{Differing as _, ExploreError, Finding, FuzzCase};
+use super::{ExploreError, Finding, FuzzCase};
 use crate::manual::Manual;
 use crate::scenario::verdict::Verdict;
 use std::path::{Path, PathBuf};
@@ -35,36 +35,6 @@ pub struct Promoted {
 /// Plays a scenario with this name and text on simulated drives. Returns the verdict, the reason and the page.
 pub(crate) type Plays = fn(&str, &str) -> Result<(Verdict, String, String), ExploreError>;
 
-/// A case whose findings can be kept as scenarios.
-pub trait Promotes: FuzzCase {
-    /// The manual of its bus.
-    const MANUAL: Manual;
-
-    /// How the drives of a finding differ, in words for a title.
-    fn kind(finding: &Finding<Self>) -> String {
-        finding.difference.signature()
-    }
-
-    /// The scenario of a finding, with a title and a table of the manual of its own, or those of the finding.
-    ///
-    /// # Errors
-    /// The model cannot be made.
-    fn scenario(
-        finding: &Finding<Self>,
-        title: &str,
-        source: Option<&str>,
-    ) -> Result<String, ExploreError>;
-
-    /// The same for the drives with the planted deviations; `None` where none was planted.
-    ///
-    /// # Errors
-    /// The model cannot be made.
-    fn on_deviating(finding: &Finding<Self>) -> Result<Option<String>, ExploreError>;
-
-    /// The folder and the text of an input of the fuzz targets.
-    fn input(finding: &Finding<Self>, title: &str) -> Option<(&'static str, String)>;
-}
-
 /// The top folder of the checkout that contains `from`.
 ///
 /// # Errors
@@ -88,7 +58,7 @@ pub fn checkout(from: &Path) -> Result<PathBuf, ExploreError> {
 ///
 /// # Errors
 /// The name or the table is invalid, a file exists, or the scenario does not pass on the model.
-pub fn promote<C: Promotes>(
+pub fn promote<C: FuzzCase>(
     finding: &Finding<C>,
     naming: &Naming,
     (top, played): (&Path, Plays),
@@ -103,11 +73,10 @@ pub fn promote<C: Promotes>(
     if let Some(source) = &naming.source {
         known(C::MANUAL, source)?;
     }
-    let title = match &naming.title {
-        Some(title) => title.clone(),
-        None => format!("Found by fuzzing: {}", C::kind(finding)),
-    };
-    let text = C::scenario(finding, &title, naming.source.as_deref())?;
+    let title = naming.title.clone();
+    let title = title.unwrap_or_else(|| C::title(finding));
+    let source = naming.source.as_deref();
+    let text = C::scenario(finding, &title, source, false)?;
     let table = snapshot(played(name, &text)?)?;
     let file = |folder: &str, ending: &str| {
         let folder = top.join(folder).join(bus.name());
@@ -124,10 +93,12 @@ pub fn promote<C: Promotes>(
             there.display()
         )));
     }
-    let deviating = C::on_deviating(finding)?;
-    let deviating = deviating.map(|text| played("the drives under test", &text));
-    let deviating = deviating.transpose()?;
-    let fails_on_deviating = deviating.map(|(verdict, ..)| verdict == Verdict::Failed);
+    let fails = || {
+        let text = C::scenario(finding, &title, source, true)?;
+        let played = played("the drives under test", &text);
+        played.map(|(verdict, ..)| verdict == Verdict::Failed)
+    };
+    let fails_on_deviating = C::deviates(&finding.setup).then(fails).transpose()?;
     for (file, text) in &files {
         if let Err(error) = write_whole(file, text) {
             // All of them or none: none was there before.

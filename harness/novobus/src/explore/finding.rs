@@ -5,7 +5,6 @@ use crate::explore::MasterView;
 use crate::explore::judge::Judge;
 use crate::explore::text::{ExpectedBytes, Surroundings, text};
 use crate::explore::{AttemptRecord, Case, Finding};
-use crate::language::syntax::Header;
 use crate::manual::MANUAL;
 use harness_bench::explore::ExploreError;
 use harness_proto::novobus::address::RingSize;
@@ -20,7 +19,7 @@ pub(super) fn is_bounded(finding: &Finding) -> bool {
         && finding.attempts.iter().all(AttemptRecord::is_sound)
 }
 
-/// The scenario, which passes if every byte is as the model predicts, and fails if one is not.
+/// The scenario, which passes if every byte is as the model predicts, and fails if one is not. `deviating` rings have the planted deviations.
 ///
 /// # Errors
 /// The model cannot be made.
@@ -28,17 +27,12 @@ pub(crate) fn scenario(
     finding: &Finding,
     title: &str,
     sources: &[String],
+    deviating: bool,
 ) -> Result<String, ExploreError> {
-    scenario_on(finding, &finding.setup.header, title, sources)
-}
-
-/// The same for rings with another header.
-pub(crate) fn scenario_on(
-    finding: &Finding,
-    header: &Header,
-    title: &str,
-    sources: &[String],
-) -> Result<String, ExploreError> {
+    let header = match deviating {
+        true => finding.setup.with_deviations(),
+        false => finding.setup.header.clone(),
+    };
     let seen = finding.setup.model_answers(&finding.case)?;
     let any = match finding.ports {
         true => unknowable(&finding.case, &seen),
@@ -52,7 +46,7 @@ pub(crate) fn scenario_on(
     let page = Surroundings {
         title,
         sources,
-        header: Some(header),
+        header: Some(&header),
         remarks: &remarks,
         expected: Some(ExpectedBytes {
             seen: &seen,

@@ -10,14 +10,17 @@ use super::on_sim::OnSim;
 use super::oracle::Difference;
 use super::page::page;
 use super::play::MasterView;
+use super::promote::{INPUTS, input};
 use super::setup::RingSetup;
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
 use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
+use crate::manual::MANUAL;
 use harness_bench::counted::counted;
 use harness_bench::explore::{
     Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
+use harness_bench::manual::Manual;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -43,6 +46,8 @@ impl Differing for Difference {
 }
 
 impl FuzzCase for Case {
+    const MANUAL: Manual = MANUAL;
+
     type Scope = CaseScope;
     type Setup = RingSetup;
     type Spice = Spice;
@@ -100,9 +105,27 @@ impl FuzzCase for Case {
         self.ring()
     }
 
-    fn text(finding: &Finding) -> Result<String, ExploreError> {
-        let title = format!("Found by fuzzing: {}", finding.difference.kind());
-        scenario(finding, &title, &sources(finding))
+    fn kind(finding: &Finding) -> String {
+        finding.difference.kind()
+    }
+
+    fn scenario(
+        finding: &Finding,
+        title: &str,
+        source: Option<&str>,
+        deviating: bool,
+    ) -> Result<String, ExploreError> {
+        let given = source.map(|source| vec![source.to_owned()]);
+        let sources = given.unwrap_or_else(|| sources(finding));
+        scenario(finding, title, &sources, deviating)
+    }
+
+    fn deviates(setup: &RingSetup) -> bool {
+        !setup.deviates.is_empty()
+    }
+
+    fn input(finding: &Finding, title: &str) -> Option<(&'static str, String)> {
+        Some((INPUTS, input(&finding.case, title)))
     }
 
     fn again(

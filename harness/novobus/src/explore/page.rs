@@ -109,7 +109,7 @@ fn shown(
     path: &Path,
 ) -> Result<ShownScenario, ExploreError> {
     let sources = sources(finding);
-    let text = scenario(finding, &finding.difference.kind(), &sources)?;
+    let text = scenario(finding, &finding.difference.kind(), &sources, false)?;
     let (text, mut outcome, traces) = played(finding, &text)?;
     outcome.verdict = match finding.confirmed {
         true => Verdict::Failed,

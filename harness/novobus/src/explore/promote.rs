@@ -1,50 +1,15 @@
-//! What is kept of a finding on a ring: an input of the fuzz targets beside its scenario.
+//! The input of the fuzz targets that is kept of a finding on a ring, beside its scenario.
 
-use super::finding::{scenario, scenario_on, sources};
-use crate::explore::{Act, ActKind, Case, Finding, Harm};
-use crate::manual::MANUAL;
-use harness_bench::explore::ExploreError;
-use harness_bench::explore::promote::Promotes;
-use harness_bench::manual::Manual;
+use crate::explore::{Act, ActKind, Case, Harm};
 
 /// The folder of inputs.
-const INPUTS: &str = "corpora/fuzz/ring";
+pub(super) const INPUTS: &str = "corpora/fuzz/ring";
 
 /// Maximum number of bytes of an input of the fuzz target `ring`.
 const MOST_INPUT: usize = 256;
 
-impl Promotes for Case {
-    const MANUAL: Manual = MANUAL;
-
-    fn kind(finding: &Finding) -> String {
-        finding.difference.kind()
-    }
-
-    fn scenario(
-        finding: &Finding,
-        title: &str,
-        source: Option<&str>,
-    ) -> Result<String, ExploreError> {
-        let given = source.map(|source| vec![source.to_owned()]);
-        scenario(finding, title, &given.unwrap_or_else(|| sources(finding)))
-    }
-
-    fn on_deviating(finding: &Finding) -> Result<Option<String>, ExploreError> {
-        if finding.setup.deviates.is_empty() {
-            return Ok(None);
-        }
-        let header = finding.setup.with_deviations();
-        let text = scenario_on(finding, &header, "the ring under test", &[])?;
-        Ok(Some(text))
-    }
-
-    fn input(finding: &Finding, title: &str) -> Option<(&'static str, String)> {
-        Some((INPUTS, input(&finding.case, title)))
-    }
-}
-
 /// The input of the fuzz target `ring`: what is damaged and where, then the bytes of the wire.
-fn input(case: &Case, title: &str) -> String {
+pub(super) fn input(case: &Case, title: &str) -> String {
     let bytes = case.bytes();
     let (head, note) = match damage(case) {
         Some(head) => (head, ""),

@@ -3,8 +3,8 @@
 use super::tell;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::explore::promote::{Naming, Plays, Promoted, Promotes, checkout, promote as write};
-use crate::explore::{ExploreError, Finding};
+use crate::explore::promote::{Naming, Plays, Promoted, checkout, promote as write};
+use crate::explore::{ExploreError, Finding, FuzzCase};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub struct PromoteArguments {
 }
 
 /// Writes the files.
-pub fn keep<C: Promotes>(
+pub fn keep<C: FuzzCase>(
     arguments: &PromoteArguments,
     played: Plays,
     output: &mut Output,
@@ -54,7 +54,7 @@ pub fn keep<C: Promotes>(
     Ok(Exit::Passed)
 }
 
-fn promoted<C: Promotes>(
+fn promoted<C: FuzzCase>(
     arguments: &PromoteArguments,
     played: Plays,
 ) -> Result<Promoted, ExploreError> {

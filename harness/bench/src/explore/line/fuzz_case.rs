@@ -3,11 +3,10 @@
 use super::generate::Maker;
 use super::text::text;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
-use crate::explore::promote::Promotes;
 use crate::explore::smaller::{Shrinkable, fewer};
 use crate::explore::{
-    Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
-    Pool, Rehearsal, Swarm, Target, played_again,
+    Confirmation, Dice, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Pool,
+    Rehearsal, Swarm, Target, played_again,
 };
 use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
@@ -19,6 +18,8 @@ use std::ops::Range;
 pub enum NoAttempt {}
 
 impl<B: LineBus> FuzzCase for LineTalk<B> {
+    const MANUAL: Manual = B::MANUAL;
+
     type Scope = LineScope<B>;
     type Setup = LineSetup;
     type Spice = B::Spice;
@@ -62,9 +63,17 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
         0
     }
 
-    fn text(finding: &Finding<Self>) -> Result<String, ExploreError> {
-        let title = format!("Found by fuzzing: {}", finding.difference.signature());
-        text(finding, &title, None, false)
+    fn scenario(
+        finding: &Finding<Self>,
+        title: &str,
+        source: Option<&str>,
+        deviating: bool,
+    ) -> Result<String, ExploreError> {
+        text(finding, title, source, deviating)
+    }
+
+    fn deviates(setup: &LineSetup) -> bool {
+        !setup.deviates.is_empty()
     }
 
     fn again(
@@ -95,28 +104,6 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
             confirmation.by_others(finding);
         }
         Ok(())
-    }
-}
-
-impl<B: LineBus> Promotes for LineTalk<B> {
-    const MANUAL: Manual = B::MANUAL;
-
-    fn scenario(
-        finding: &Finding<Self>,
-        title: &str,
-        source: Option<&str>,
-    ) -> Result<String, ExploreError> {
-        text(finding, title, source, false)
-    }
-
-    fn on_deviating(finding: &Finding<Self>) -> Result<Option<String>, ExploreError> {
-        let planted = !finding.setup.deviates.is_empty();
-        let under_test = || text(finding, "the drives under test", None, true);
-        planted.then(under_test).transpose()
-    }
-
-    fn input(_: &Finding<Self>, _: &str) -> Option<(&'static str, String)> {
-        None
     }
 }
 

@@ -279,7 +279,7 @@ fn not_blamed(cases: u64) {
         let ring = AnyRing::new(3, properties, Wrong::Nothing, number);
         let (found, not_sent) = run(ring, number, cases, &[]);
         let told = found.iter().map(|finding| {
-            let text = scenario(finding, "it was blamed", &[]).unwrap_or_default();
+            let text = scenario(finding, "it was blamed", &[], false).unwrap_or_default();
             format!(
                 "{} confirmed {}\n{text}",
                 finding.difference.about, finding.confirmed

@@ -66,7 +66,7 @@ fn page(finding: &Finding, shrunk: Shrunk) -> String {
         case: shrunk.subject.case,
         ..finding.clone()
     };
-    scenario(&new, "small", &sources(&new)).expect("a ring")
+    scenario(&new, "small", &sources(&new), false).expect("a ring")
 }
 
 /// A drive that does not write: what is left is a telegram that writes and one that reads (ND21 10.1, 10.2).

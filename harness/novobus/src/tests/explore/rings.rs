@@ -86,7 +86,7 @@ fn a_deviating_drive_of_either_ring() {
 #[test]
 fn the_scenario_names_its_ring() {
     let (found, _) = explore(&planted(1, 2, "writes-ignored"), 2, 5_000);
-    let text = scenario(&found[0], "two rings", &[]).expect("rings");
+    let text = scenario(&found[0], "two rings", &[], false).expect("rings");
     assert!(text.contains("\nring    2, 3\n"), "{text}");
     assert!(text.contains("\n2> ") && text.contains("\n2< "), "{text}");
     assert!(!text.contains("\n> ") && !text.contains("\n< "), "{text}");

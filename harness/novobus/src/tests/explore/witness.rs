@@ -35,7 +35,7 @@ fn sound_drives_pass() {
     for seed in [1, 2, 3, seed()] {
         let (found, cases) = explore(None, seed, 400);
         if let Some(finding) = found.first() {
-            let text = scenario(finding, "a finding", &[]).expect("a ring");
+            let text = scenario(finding, "a finding", &[], false).expect("a ring");
             let again = repeat("sound_drives_pass");
             panic!("seed {seed}: {:#?}\n{text}\n{again}", finding.difference);
         }
