@@ -78,6 +78,14 @@ impl Manual {
         Ok(toml::from_str::<Tables>(self.tables)?.table)
     }
 
+    /// The name of the first table of a section, or else of the section `usual`.
+    #[must_use]
+    pub fn table_of(&self, section: &str, usual: &str) -> Option<String> {
+        let tables = self.tables().unwrap_or_default();
+        let of = |section| tables.iter().find(|table| table.section == section);
+        Some(of(section).or_else(|| of(usual))?.id.clone())
+    }
+
     /// The errata ledger, in order of the manual.
     ///
     /// # Errors

@@ -3,15 +3,16 @@
 use super::case::{Act, Case};
 use super::confirm::judged_again;
 use super::confirm::on_ring;
-use super::finding::{is_bounded, scenario, sources};
 use super::generate::{CaseScope, Generator};
+use super::judge::Judge;
 use super::mutate::mutate;
 use super::on_sim::OnSim;
 use super::oracle::Difference;
 use super::page::page;
 use super::play::MasterView;
 use super::promote::{INPUTS, input};
-use super::setup::RingSetup;
+use super::setup::{RingSetup, planted_line};
+use super::text::{ExpectedBytes, Surroundings, text};
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
 use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
@@ -21,8 +22,12 @@ use harness_bench::explore::{
     Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
 use harness_bench::manual::Manual;
+use harness_proto::novobus::address::RingSize;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Maximum number of attempts of a finding.
+const MOST_ATTEMPTS: usize = 1_000;
 
 impl Differing for Difference {
     fn is_like(&self, other: &Self) -> bool {
@@ -115,9 +120,34 @@ impl FuzzCase for Case {
         source: Option<&str>,
         deviating: bool,
     ) -> Result<String, ExploreError> {
-        let given = source.map(|source| vec![source.to_owned()]);
-        let sources = given.unwrap_or_else(|| sources(finding));
-        scenario(finding, title, &sources, deviating)
+        let (case, setup) = (&finding.case, &finding.setup);
+        let source = source.map(|source| vec![source.to_owned()]);
+        let header = match deviating {
+            true => setup.with_deviations(),
+            false => setup.header.clone(),
+        };
+        let seen = setup.model_answers(case)?;
+        let any = match finding.ports {
+            true => unknowable(case, &seen),
+            false => Vec::new(),
+        };
+        let timed = finding.difference.byte.filter(|_| finding.difference.time);
+        let mut remarks = vec![finding.difference.about.clone()];
+        for planted in &setup.deviates {
+            remarks.push(format!("found on {}", planted_line(planted)));
+        }
+        let page = Surroundings {
+            title,
+            sources: &source.unwrap_or_else(|| sources(finding)),
+            header: Some(&header),
+            remarks: &remarks,
+            expected: Some(ExpectedBytes {
+                seen: &seen,
+                any: &any,
+                timed: timed.and_then(|byte| byte.checked_sub(1)),
+            }),
+        };
+        Ok(text(case, &page))
     }
 
     fn deviates(setup: &RingSetup) -> bool {
@@ -153,7 +183,9 @@ impl FuzzCase for Case {
     }
 
     fn is_sound(finding: &Finding) -> bool {
-        is_bounded(finding)
+        finding.case.is_kept()
+            && finding.attempts.len() <= MOST_ATTEMPTS
+            && finding.attempts.iter().all(AttemptRecord::is_sound)
     }
 
     fn confirm(
@@ -175,6 +207,22 @@ fn told(finding: &Finding) -> String {
         "{}; seen again {seen_again} of {of} times; {sent} sent",
         finding.difference.about
     )
+}
+
+/// The tables of the manual that it is about, as the catalogue names them.
+pub(super) fn sources(finding: &Finding) -> Vec<String> {
+    let table = MANUAL.table_of(&finding.difference.section, "9.1");
+    table.into_iter().collect()
+}
+
+/// Bytes that drives may answer in more than one way: what they hold and measure, and the checking bytes over it.
+fn unknowable(case: &Case, seen: &MasterView) -> Vec<usize> {
+    let Ok(size) = RingSize::new(u64::from(case.drives)) else {
+        return Vec::new();
+    };
+    let mut any = Judge::new(case.ring(), size, true).foresee(case).open;
+    any.retain(|index| *index < seen.received.len());
+    any
 }
 
 /// Interleaves the cases of several tours.

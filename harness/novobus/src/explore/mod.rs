@@ -3,7 +3,6 @@
 mod case;
 mod confirm;
 mod expect;
-mod finding;
 mod fuzz_case;
 mod generate;
 mod html;
@@ -29,8 +28,6 @@ mod tour;
 #[cfg(test)]
 pub(crate) use case::OtherRing;
 pub(crate) use case::{Act, ActKind, Case, Harm, MOST_BYTES};
-#[cfg(test)]
-pub(crate) use finding::{scenario, sources};
 #[cfg(test)]
 pub(crate) use generate::Generator;
 pub(crate) use generate::{CaseScope, RingScope};

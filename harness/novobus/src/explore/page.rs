@@ -1,6 +1,6 @@
 //! The page of a run of fuzzing, made from its folder and nothing else: the same folder gives the same page.
 
-use super::finding::{scenario, sources};
+use super::fuzz_case::sources;
 use super::html::{Explored, explored};
 use super::setup::planted_line;
 use crate::explore::Case;
@@ -10,8 +10,7 @@ use crate::explore::{KeptRun, LogLine};
 use crate::language::read::RingScenario;
 use crate::report::ring::RingReport;
 use crate::simulate::simulated;
-use harness_bench::explore::ExploreError;
-use harness_bench::explore::read_as;
+use harness_bench::explore::{ExploreError, FuzzCase as _, read_as};
 use harness_bench::link::Link;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::{self, AtMismatch, Outcome};
@@ -109,7 +108,7 @@ fn shown(
     path: &Path,
 ) -> Result<ShownScenario, ExploreError> {
     let sources = sources(finding);
-    let text = scenario(finding, &finding.difference.kind(), &sources, false)?;
+    let text = Case::scenario(finding, &finding.difference.kind(), None, false)?;
     let (text, mut outcome, traces) = played(finding, &text)?;
     outcome.verdict = match finding.confirmed {
         true => Verdict::Failed,

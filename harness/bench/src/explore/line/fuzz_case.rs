@@ -1,12 +1,11 @@
 //! Conversations as the engine explores them.
 
 use super::generate::Maker;
-use super::text::text;
-use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
+use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, PlantedDrive, Seen};
 use crate::explore::smaller::{Shrinkable, fewer};
 use crate::explore::{
-    Confirmation, Dice, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Pool,
-    Rehearsal, Swarm, Target, played_again,
+    Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
+    Pool, Rehearsal, Swarm, Target, played_again,
 };
 use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
@@ -63,13 +62,37 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
         0
     }
 
+    /// On deviating drives without the values of open points with which the model explains most: those are not the drives' own.
     fn scenario(
         finding: &Finding<Self>,
         title: &str,
         source: Option<&str>,
         deviating: bool,
     ) -> Result<String, ExploreError> {
-        text(finding, title, source, deviating)
+        let difference = &finding.difference;
+        let (section, under, is_time) = B::basis(difference);
+        let mut header = [&finding.setup.header[..], under].concat();
+        let setup = LineSetup::new::<B>(header.clone(), Vec::new()).under_test::<B>()?;
+        let planted = finding.setup.deviates.iter().map(PlantedDrive::line::<B>);
+        if deviating {
+            header = finding.setup.header.clone();
+            header.extend(planted.clone());
+        }
+        let seen = B::play(&setup, &finding.case);
+        let bus = B::BUS.name();
+        let usual = || B::MANUAL.table_of(section, B::USUAL_SECTION);
+        let source = source.map(str::to_owned).or_else(usual).unwrap_or_default();
+        let mut text = format!("title   {title}\nsource  {source}\nbus     {bus}\n");
+        for line in &header {
+            text.push_str(&format!("{line}\n"));
+        }
+        text.push_str(&format!("\n# {}\n", difference.about()));
+        for planted in planted {
+            text.push_str(&format!("# found on {planted}\n"));
+        }
+        let timed = difference.place().filter(|_| is_time);
+        B::steps(&setup, &finding.case, &seen, timed, &mut text);
+        Ok(text)
     }
 
     fn deviates(setup: &LineSetup) -> bool {

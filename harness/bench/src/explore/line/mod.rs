@@ -11,7 +11,6 @@ pub mod oracle;
 pub mod rig;
 pub mod setup;
 pub mod talk;
-pub mod text;
 #[cfg(any(test, feature = "trials"))]
 pub mod trial;
 

@@ -9,12 +9,12 @@ use crate::explore::case::{Act, Case};
 use crate::explore::generate::{CaseScope, RingScope};
 use crate::explore::setup::RingSetup;
 use crate::explore::{Rehearsal, Tried};
-use crate::explore::{Spice, Swarm, scenario};
+use crate::explore::{Spice, Swarm};
 use harness_bench::explore::Dice;
-use harness_bench::explore::ExploreError;
 use harness_bench::explore::Progress;
 use harness_bench::explore::Target;
 use harness_bench::explore::{Bounds, RunEnd, Watcher};
+use harness_bench::explore::{ExploreError, FuzzCase as _};
 use harness_proto::nd21::own;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_proto::novobus::error::BusError;
@@ -279,7 +279,7 @@ fn not_blamed(cases: u64) {
         let ring = AnyRing::new(3, properties, Wrong::Nothing, number);
         let (found, not_sent) = run(ring, number, cases, &[]);
         let told = found.iter().map(|finding| {
-            let text = scenario(finding, "it was blamed", &[], false).unwrap_or_default();
+            let text = Case::scenario(finding, "it was blamed", None, false).unwrap_or_default();
             format!(
                 "{} confirmed {}\n{text}",
                 finding.difference.about, finding.confirmed

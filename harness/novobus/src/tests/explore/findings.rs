@@ -2,13 +2,12 @@
 
 use super::{Difference, bounds, explore, planted};
 use crate::explore::shrink::{Shrunk, Subject, shrink};
-use crate::explore::{Finding, OnSim, RingSetup, against_reference, play};
-use crate::explore::{scenario, sources};
+use crate::explore::{Case, Finding, OnSim, RingSetup, against_reference, play};
 use crate::language::read::RingScenario;
 use crate::simulate::simulated;
 use harness_bench::explore::promote::{Naming, checkout, promote};
 use harness_bench::explore::smaller::Shrinkable as _;
-use harness_bench::explore::{ExploreError, Target};
+use harness_bench::explore::{ExploreError, FuzzCase as _, Target};
 use harness_bench::link::Link as _;
 use harness_bench::scenario::run::run;
 use harness_bench::scenario::source::Source;
@@ -66,7 +65,7 @@ fn page(finding: &Finding, shrunk: Shrunk) -> String {
         case: shrunk.subject.case,
         ..finding.clone()
     };
-    scenario(&new, "small", &sources(&new), false).expect("a ring")
+    Case::scenario(&new, "small", None, false).expect("a ring")
 }
 
 /// A drive that does not write: what is left is a telegram that writes and one that reads (ND21 10.1, 10.2).

@@ -1,14 +1,12 @@
 //! Rigs of two rings: a case is with one of them, and the other one stays as it is (ND21 12.2).
 
 use super::{Heard, about, bounds, scope_of};
-use crate::explore::scenario;
 use crate::explore::shrink::{Subject, shrink};
 use crate::explore::{
     Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
 };
 use crate::language::syntax::Header;
-use harness_bench::explore::Planted;
-use harness_bench::explore::{Target, by_novelty};
+use harness_bench::explore::{FuzzCase as _, Planted, Target, by_novelty};
 use harness_bench::link::Line as _;
 use harness_bench::link::Octets;
 use harness_proto::time::Span;
@@ -86,7 +84,7 @@ fn a_deviating_drive_of_either_ring() {
 #[test]
 fn the_scenario_names_its_ring() {
     let (found, _) = explore(&planted(1, 2, "writes-ignored"), 2, 5_000);
-    let text = scenario(&found[0], "two rings", &[], false).expect("rings");
+    let text = Case::scenario(&found[0], "two rings", None, false).expect("rings");
     assert!(text.contains("\nring    2, 3\n"), "{text}");
     assert!(text.contains("\n2> ") && text.contains("\n2< "), "{text}");
     assert!(!text.contains("\n> ") && !text.contains("\n< "), "{text}");

@@ -1,8 +1,8 @@
 //! Whole ND21s without a model beside them: the witnesses find nothing where nothing is wrong, and most of what is.
 
 use super::{Heard, about, bounds, repeat, scope, seed};
-use crate::explore::{Finding, FuzzRun, OnSim, RingSetup, Spice, scenario};
-use harness_bench::explore::Planted;
+use crate::explore::{Case, Finding, FuzzRun, OnSim, RingSetup, Spice};
+use harness_bench::explore::{FuzzCase as _, Planted};
 
 /// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
 fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {
@@ -35,7 +35,7 @@ fn sound_drives_pass() {
     for seed in [1, 2, 3, seed()] {
         let (found, cases) = explore(None, seed, 400);
         if let Some(finding) = found.first() {
-            let text = scenario(finding, "a finding", &[], false).expect("a ring");
+            let text = Case::scenario(finding, "a finding", None, false).expect("a ring");
             let again = repeat("sound_drives_pass");
             panic!("seed {seed}: {:#?}\n{text}\n{again}", finding.difference);
         }
