@@ -19,7 +19,7 @@ use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
 use crate::manual::MANUAL;
 use harness_bench::counted::counted;
 use harness_bench::explore::{
-    Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
+    Confirmation, Dice, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
 use harness_bench::manual::Manual;
 use harness_proto::novobus::address::RingSize;
@@ -28,27 +28,6 @@ use std::path::Path;
 
 /// Maximum number of attempts of a finding.
 const MOST_ATTEMPTS: usize = 1_000;
-
-impl Differing for Difference {
-    fn is_like(&self, other: &Self) -> bool {
-        Difference::is_like(self, other)
-    }
-    fn key(&self) -> String {
-        Difference::key(self)
-    }
-    fn signature(&self) -> String {
-        Difference::signature(self)
-    }
-    fn about(&self) -> &str {
-        &self.about
-    }
-    fn place(&self) -> Option<usize> {
-        self.byte
-    }
-    fn is_time(&self) -> bool {
-        self.time
-    }
-}
 
 impl FuzzCase for Case {
     const MANUAL: Manual = MANUAL;

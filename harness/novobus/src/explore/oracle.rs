@@ -10,7 +10,7 @@ use crate::link::BesideTheBus;
 use crate::link::SimulatedLink;
 use crate::section::SentBytes;
 use crate::twin::{self, Symptom};
-use harness_bench::explore::is_first;
+use harness_bench::explore::{Differing, is_first};
 use harness_bench::link::{Link, Octets, link_name};
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
@@ -54,37 +54,11 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// Whether another finding is of the same kind: the same symptom, against the same rule of the same section.
-    #[must_use]
-    pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let same_rule = self.section == other.section && self.rule == other.rule;
-        same_rule && self.what == other.what
-    }
-
     /// The kind of the finding in words.
     #[must_use]
     pub(crate) fn kind(&self) -> String {
         let what = self.what.words();
         format!("{what} (ND21 {}, {})", self.section, self.rule)
-    }
-
-    /// Identifies a finding within a run: the same kind, in telegrams to the same drive.
-    #[must_use]
-    pub(crate) fn key(&self) -> String {
-        match self.meant {
-            Some(drive) => format!(
-                "to drive {}: {}",
-                drive_name(self.ring, drive),
-                self.signature_of(None)
-            ),
-            None => self.signature_of(self.drive),
-        }
-    }
-
-    /// The kind, and the drive that is to blame where that is known.
-    #[must_use]
-    pub(crate) fn signature(&self) -> String {
-        self.signature_of(self.drive)
     }
 
     fn signature_of(&self, drive: Option<u8>) -> String {
@@ -94,6 +68,42 @@ impl Difference {
             (None, 0) => kind,
             (None, _) => format!("ring 2: {kind}"),
         }
+    }
+}
+
+impl Differing for Difference {
+    fn is_like(&self, other: &Self) -> bool {
+        let same_rule = self.section == other.section && self.rule == other.rule;
+        same_rule && self.what == other.what
+    }
+
+    /// The same kind, in telegrams to the same drive.
+    fn key(&self) -> String {
+        match self.meant {
+            Some(drive) => format!(
+                "to drive {}: {}",
+                drive_name(self.ring, drive),
+                self.signature_of(None)
+            ),
+            None => self.signature(),
+        }
+    }
+
+    /// The kind, and the drive that is to blame where that is known.
+    fn signature(&self) -> String {
+        self.signature_of(self.drive)
+    }
+
+    fn about(&self) -> &str {
+        &self.about
+    }
+
+    fn place(&self) -> Option<usize> {
+        self.byte
+    }
+
+    fn is_time(&self) -> bool {
+        self.time
     }
 }
 

@@ -10,7 +10,7 @@ use crate::explore::{KeptRun, LogLine};
 use crate::language::read::RingScenario;
 use crate::report::ring::RingReport;
 use crate::simulate::simulated;
-use harness_bench::explore::{ExploreError, FuzzCase as _, read_as};
+use harness_bench::explore::{Differing as _, ExploreError, FuzzCase as _, read_as};
 use harness_bench::link::Link;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::{self, AtMismatch, Outcome};

@@ -12,7 +12,7 @@ use harness_bench::command::output::Output;
 use harness_bench::command::rig_failure::use_options;
 use harness_bench::counted::counted;
 use harness_bench::explore::Planted;
-use harness_bench::explore::{ExploreError, Target};
+use harness_bench::explore::{Differing as _, ExploreError, Target};
 use harness_bench::rig::buses::RigBuses;
 use harness_sim::novobus::deviation::DEVIATIONS;
 use std::path::Path;

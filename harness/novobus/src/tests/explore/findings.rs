@@ -7,7 +7,7 @@ use crate::language::read::RingScenario;
 use crate::simulate::simulated;
 use harness_bench::explore::promote::{Naming, checkout, promote};
 use harness_bench::explore::smaller::Shrinkable as _;
-use harness_bench::explore::{ExploreError, FuzzCase as _, Target};
+use harness_bench::explore::{Differing as _, ExploreError, FuzzCase as _, Target};
 use harness_bench::link::Link as _;
 use harness_bench::scenario::run::run;
 use harness_bench::scenario::source::Source;

@@ -6,7 +6,7 @@ use crate::explore::{
     Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
 };
 use crate::language::syntax::Header;
-use harness_bench::explore::{FuzzCase as _, Planted, Target, by_novelty};
+use harness_bench::explore::{Differing as _, FuzzCase as _, Planted, Target, by_novelty};
 use harness_bench::link::Line as _;
 use harness_bench::link::Octets;
 use harness_proto::time::Span;

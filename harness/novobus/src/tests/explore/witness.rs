@@ -2,7 +2,7 @@
 
 use super::{Heard, about, bounds, repeat, scope, seed};
 use crate::explore::{Case, Finding, FuzzRun, OnSim, RingSetup, Spice};
-use harness_bench::explore::{FuzzCase as _, Planted};
+use harness_bench::explore::{Differing as _, FuzzCase as _, Planted};
 
 /// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
 fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {
