@@ -7,8 +7,36 @@ use super::{Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, Judge
 use crate::counted::counted;
 use std::collections::BTreeMap;
 
-/// Tries the case of a finding on simulated drives, and again until it is confirmed or is not, as the run did. `known` says how often each
-/// difference was found before, by its key.
+/// Tries the case of a finding, and again until it is confirmed or is not, as the run did; `None` if nothing differs at first. `known` says how
+/// often each difference was found before, by its key.
+///
+/// # Errors
+/// The target fails.
+pub fn tried_again<C: FuzzCase>(
+    finding: Finding<C>,
+    about: &FuzzSettings<C>,
+    known: &BTreeMap<String, u8>,
+    target: &mut dyn Target<C>,
+) -> Result<Option<Finding<C>>, ExploreError> {
+    let rehearsal = target.rehearse(&finding.case)?;
+    let tried = target.attempt(&finding.case, &rehearsal)?;
+    let Some(difference) = tried.difference else {
+        return Ok(None);
+    };
+    let mut again = Finding {
+        difference,
+        seen_again: 0,
+        of: 0,
+        confirmed: false,
+        ..finding
+    };
+    let mut confirmation = Confirmation::new(about.confirm, about.of, known);
+    let before = tried.before.as_deref();
+    C::confirm(&mut confirmation, &mut again, &rehearsal, before, target)?;
+    Ok(Some(again))
+}
+
+/// The same on simulated drives, and whether it gives the same finding.
 ///
 /// # Errors
 /// The model cannot be made.
@@ -18,25 +46,16 @@ pub fn played_again<C: FuzzCase>(
     known: &BTreeMap<String, u8>,
     target: &mut dyn Target<C>,
 ) -> Result<JudgedAgain, ExploreError> {
-    let rehearsal = target.rehearse(&finding.case)?;
-    let tried = target.attempt(&finding.case, &rehearsal)?;
-    let Some(difference) = tried.difference else {
-        return Ok(JudgedAgain::Differs(
-            "nothing differs in its conversation".to_owned(),
-        ));
-    };
-    let mut again = Finding {
-        difference,
-        seen_again: 0,
-        of: 0,
-        confirmed: false,
+    let first = Finding {
         shrunk_in: None,
         attempts: Vec::new(),
         ..finding.clone()
     };
-    let mut confirmation = Confirmation::new(about.confirm, about.of, known);
-    let before = tried.before.as_deref();
-    C::confirm(&mut confirmation, &mut again, &rehearsal, before, target)?;
+    let Some(again) = tried_again(first, about, known, target)? else {
+        return Ok(JudgedAgain::Differs(
+            "nothing differs in its conversation".to_owned(),
+        ));
+    };
     if again == *finding {
         return Ok(JudgedAgain::Same);
     }

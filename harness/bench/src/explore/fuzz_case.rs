@@ -159,5 +159,12 @@ pub trait FuzzCase:
         rehearsal: &Rehearsal<Self>,
         before: Option<&[Self::Act]>,
         target: &mut dyn Target<Self>,
-    ) -> Result<(), ExploreError>;
+    ) -> Result<(), ExploreError> {
+        let _begins_anew = before;
+        confirmation.again(finding, rehearsal, target)?;
+        if !finding.confirmed {
+            confirmation.by_others(finding);
+        }
+        Ok(())
+    }
 }

@@ -24,7 +24,7 @@ pub mod swarm;
 pub mod target;
 
 pub(crate) use again::file_of;
-pub use again::{impossible, played_again};
+pub use again::{impossible, played_again, tried_again};
 pub(crate) use campaign::count_finding;
 pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
 pub use confirm::Confirmation;

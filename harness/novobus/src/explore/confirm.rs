@@ -4,7 +4,7 @@ use super::case::{Act, ActKind, Case, Talk, To};
 use super::on_record::OnRecord;
 use super::setup::drive_name;
 use crate::explore::{Finding, FuzzSettings, Rehearsal};
-use harness_bench::explore::{Confirmation, ExploreError, Target};
+use harness_bench::explore::{Confirmation, ExploreError, Target, tried_again};
 use std::collections::BTreeMap;
 
 /// A finding of a ring with ports as its attempts give it; `None` where it has none. `known` says how often each difference was found
@@ -21,28 +21,13 @@ pub(crate) fn judged_again(
     let Some(case) = target.next().cloned() else {
         return Ok(None);
     };
-    let rehearsal = Rehearsal::default();
-    let first = target.attempt(&case, &rehearsal)?;
-    let wrong = |what: &str| ExploreError::File(what.to_owned());
-    let difference = first.difference;
-    let difference = difference.ok_or_else(|| wrong("nothing differs in its first attempt"))?;
-    let mut again = Finding {
-        difference,
+    let first = Finding {
         case,
-        seen_again: 0,
-        of: 0,
-        confirmed: false,
         ..finding.clone()
     };
-    let mut confirmation = Confirmation::new(settings.confirm, settings.of, known);
-    let before = first.before.as_deref();
-    on_ring(
-        &mut confirmation,
-        &mut again,
-        &rehearsal,
-        before,
-        &mut target,
-    )?;
+    let wrong = |what: &str| ExploreError::File(what.to_owned());
+    let again = tried_again(first, settings, known, &mut target)?;
+    let again = again.ok_or_else(|| wrong("nothing differs in its first attempt"))?;
     match target.over() {
         Some(_) => Ok(Some(again)),
         None => Err(wrong("it has more attempts than a run makes")),

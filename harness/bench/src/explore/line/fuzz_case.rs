@@ -4,8 +4,8 @@ use super::generate::Maker;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, PlantedDrive, Seen};
 use crate::explore::smaller::{Shrinkable, fewer};
 use crate::explore::{
-    Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
-    Pool, Rehearsal, Swarm, Target, played_again,
+    Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Pool, Swarm,
+    played_again,
 };
 use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
@@ -113,20 +113,6 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
 
     fn is_sound(finding: &Finding<Self>) -> bool {
         finding.case.is_bounded() && finding.setup.bus == B::BUS.name()
-    }
-
-    fn confirm(
-        confirmation: &mut Confirmation<'_>,
-        finding: &mut Finding<Self>,
-        rehearsal: &Rehearsal<Self>,
-        _: Option<&[Self::Act]>,
-        target: &mut dyn Target<Self>,
-    ) -> Result<(), ExploreError> {
-        confirmation.again(finding, rehearsal, target)?;
-        if !finding.confirmed {
-            confirmation.by_others(finding);
-        }
-        Ok(())
     }
 }
 
