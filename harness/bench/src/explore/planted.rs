@@ -9,6 +9,8 @@ pub struct Planted {
     /// In which ring, counted from 0.
     #[serde(default, skip_serializing_if = "is_first")]
     pub ring: usize,
+    /// The drive's number or address.
+    #[serde(alias = "slave")]
     pub drive: u8,
     /// The name of the deviation.
     pub name: String,

@@ -9,12 +9,11 @@ use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_sma
 use crate::command::output::Output;
 use crate::command::rig_failure::{exit_of, exit_of_end, find_any_rig, tell_end, use_options};
 use crate::counted::counted;
-use crate::explore::line::{
-    LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
-};
+use crate::explore::line::{LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, SessionOf};
 use crate::explore::smaller::{Smaller, smaller};
 use crate::explore::{
-    Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Spiced, Target, read_as,
+    Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Planted, Spiced, Target,
+    read_as,
 };
 use crate::link::Line as _;
 use crate::rig::buses::RigBuses;
@@ -86,17 +85,12 @@ fn run<B: LineRig>(
         Some(kept) => kept.about.ports,
         None => arguments.behind_port || !rig.is_simulated(),
     };
-    let planted = arguments.deviates.iter().map(|own| PlantedDrive {
-        drive: own.drive,
-        name: own.name.clone(),
-    });
-    let planted: Vec<_> = planted.collect();
+    let planted = arguments.deviates.clone();
     let run = (arguments.seed, arguments.confirm);
     if ports {
         let mut rig = rig.clone();
         if let Some(sim) = &mut rig.file.sim {
-            sim.setup
-                .extend(planted.iter().map(PlantedDrive::line::<B>));
+            sim.setup.extend(planted.iter().map(Planted::line::<B>));
         }
         let how = use_options("fuzz", arguments.allow_motion, arguments.wait);
         return on_adapter::<B>(&rig, &how, output, |target, (scope, setup), output| {

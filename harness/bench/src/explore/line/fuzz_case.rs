@@ -1,11 +1,11 @@
 //! Conversations as the engine explores them.
 
 use super::generate::Maker;
-use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, PlantedDrive, Seen};
+use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
 use crate::explore::smaller::{Shrinkable, fewer};
 use crate::explore::{
-    Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Pool, Swarm,
-    played_again,
+    Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Planted,
+    Pool, Swarm, is_first, played_again,
 };
 use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,7 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
         let (section, under, is_time) = B::basis(difference);
         let mut header = [&finding.setup.header[..], under].concat();
         let setup = LineSetup::new::<B>(header.clone(), Vec::new()).under_test::<B>()?;
-        let planted = finding.setup.deviates.iter().map(PlantedDrive::line::<B>);
+        let planted = finding.setup.deviates.iter().map(Planted::line::<B>);
         if deviating {
             header = finding.setup.header.clone();
             header.extend(planted.clone());
@@ -112,7 +112,9 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
     }
 
     fn is_sound(finding: &Finding<Self>) -> bool {
-        finding.case.is_bounded() && finding.setup.bus == B::BUS.name()
+        let LineSetup { bus, deviates, .. } = &finding.setup;
+        let on_line = deviates.iter().all(|planted| is_first(&planted.ring));
+        finding.case.is_bounded() && bus == B::BUS.name() && on_line
     }
 }
 

@@ -19,7 +19,7 @@ pub use generate::LineScope;
 pub(crate) use on_sim::OnLine;
 pub use rig::{LineRig, ONLY_SIMULATED, pass};
 pub(crate) use rig::{OnAdapter, SessionOf};
-pub use setup::{LineSetup, PlantedDrive};
+pub use setup::LineSetup;
 pub use talk::{ActBounds, LineAct, LineSeen, LineTalk, Seen};
 
 use crate::bus_name::BusName;

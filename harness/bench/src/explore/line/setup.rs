@@ -1,7 +1,7 @@
 //! What the simulated drives of a run are made of.
 
 use super::LineBus;
-use crate::explore::ExploreError;
+use crate::explore::{ExploreError, Planted};
 use crate::rig::Rig;
 use crate::rig::session::setup_lines;
 use crate::scenario::source::Source;
@@ -17,22 +17,11 @@ pub struct LineSetup {
     pub header: Vec<String>,
     /// What is planted in the drives under test, and not in their model.
     #[serde(default)]
-    pub deviates: Vec<PlantedDrive>,
+    pub deviates: Vec<Planted>,
 }
 
-/// A deviation of a drive.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlantedDrive {
-    /// The drive's number or address.
-    #[serde(alias = "slave")]
-    pub drive: u8,
-    /// The name of the deviation.
-    pub name: String,
-}
-
-impl PlantedDrive {
-    /// As a header line.
+impl Planted {
+    /// As a header line of a shared line.
     #[must_use]
     pub fn line<B: LineBus>(&self) -> String {
         format!("{} {} deviates {}", B::DRIVE, self.drive, self.name)
@@ -43,6 +32,7 @@ impl PlantedDrive {
         let words: Vec<_> = line.split_whitespace().collect();
         match words[..] {
             [word, drive, "deviates", name] if word == B::DRIVE => Some(Self {
+                ring: 0,
                 drive: drive.parse().ok()?,
                 name: name.to_owned(),
             }),
@@ -54,8 +44,8 @@ impl PlantedDrive {
 impl LineSetup {
     /// A line with these header lines. Deviations among them are planted in the drives under test.
     #[must_use]
-    pub fn new<B: LineBus>(header: Vec<String>, more: Vec<PlantedDrive>) -> Self {
-        let planted = |line: &String| PlantedDrive::of_line::<B>(line);
+    pub fn new<B: LineBus>(header: Vec<String>, more: Vec<Planted>) -> Self {
+        let planted = |line: &String| Planted::of_line::<B>(line);
         let (deviations, others): (Vec<_>, Vec<_>) =
             header.into_iter().partition(|line| planted(line).is_some());
         let mut deviates: Vec<_> = deviations.iter().filter_map(planted).collect();
@@ -69,7 +59,7 @@ impl LineSetup {
 
     /// The line of a rig, with more deviations than its file plants.
     #[must_use]
-    pub fn of_rig<B: LineBus>(rig: &Rig, stations: &[B::Station], more: Vec<PlantedDrive>) -> Self {
+    pub fn of_rig<B: LineBus>(rig: &Rig, stations: &[B::Station], more: Vec<Planted>) -> Self {
         let lines = B::header(rig, stations).into_iter().chain(setup_lines(rig));
         Self::new::<B>(lines.collect(), more)
     }
@@ -84,7 +74,7 @@ impl LineSetup {
             text: self.header.join("\n").into(),
         };
         let mut setup = B::simulated(&source).map_err(Box::new)?;
-        for PlantedDrive { drive, name } in &self.deviates {
+        for Planted { drive, name, .. } in &self.deviates {
             let (kind, bus) = (B::DRIVES, B::BUS.name());
             match B::plant(&mut setup, *drive, name) {
                 Some(true) => {}

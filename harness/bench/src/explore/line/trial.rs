@@ -1,13 +1,11 @@
 //! Trials of the engine on a bus, for the tests of its rooms: right drives are never accused, wrong ones are found, shrunk and kept as
 //! scenarios.
 
-use super::{
-    LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
-};
+use super::{LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, SessionOf};
 use crate::explore::smaller::{Shrinkable as _, smaller};
 use crate::explore::{
-    Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd,
-    Spiced, Swarm, Watcher,
+    Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Planted, Pool, Progress,
+    RunEnd, Spiced, Swarm, Watcher,
 };
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::language::Language;
@@ -56,7 +54,8 @@ impl<B: LineBus> EngineTrial<B> {
         seconds: u64,
         findings: usize,
     ) -> Exploration<B> {
-        let deviates = deviates.map(|name| PlantedDrive {
+        let deviates = deviates.map(|name| Planted {
+            ring: 0,
             drive: self.drive,
             name: name.to_owned(),
         });
