@@ -12,7 +12,7 @@ use super::page::page;
 use super::play::MasterView;
 use super::promote::{INPUTS, input};
 use super::setup::{RingSetup, planted_line};
-use super::text::{ExpectedBytes, Surroundings, text};
+use super::text::{Surroundings, text};
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
 use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
@@ -118,13 +118,11 @@ impl FuzzCase for Case {
         let page = Surroundings {
             title,
             sources: &source.unwrap_or_else(|| sources(finding)),
-            header: Some(&header),
+            header: &header,
             remarks: &remarks,
-            expected: Some(ExpectedBytes {
-                seen: &seen,
-                any: &any,
-                timed: timed.and_then(|byte| byte.checked_sub(1)),
-            }),
+            seen: &seen,
+            any: &any,
+            timed: timed.and_then(|byte| byte.checked_sub(1)),
         };
         Ok(text(case, &page))
     }

@@ -27,23 +27,16 @@ const RUN: usize = 4;
 const MOST_COMMENT: usize = 60;
 
 /// What stands around the steps.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'a> {
     pub title: &'a str,
     /// The tables that it pins, such as `nd21 9.7`.
     pub sources: &'a [String],
     /// What drives are before anything is sent.
-    pub header: Option<&'a Header>,
+    pub header: &'a Header,
     /// Remarks in front of the steps.
     pub remarks: &'a [String],
     /// What the master must receive.
-    pub expected: Option<ExpectedBytes<'a>>,
-}
-
-/// What the master must receive.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ExpectedBytes<'a> {
-    /// The bytes.
     pub seen: &'a MasterView,
     /// Indexes of bytes that may have any value: data that a drive measures, and their checking bytes.
     pub any: &'a [usize],
@@ -54,9 +47,7 @@ pub(crate) struct ExpectedBytes<'a> {
 /// The text of a scenario.
 #[must_use]
 pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
-    let none = Header::default();
-    let header = page.header.unwrap_or(&none);
-    let header = Header::of_rings(&case.sizes()).and(header);
+    let header = Header::of_rings(&case.sizes()).and(page.header);
     let source = |text: &String| Citation {
         text: text.clone(),
         span: TextSpan::default(),
@@ -64,7 +55,8 @@ pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let mut text: Text = Text::default();
     text.header(&Scenario {
         sources: page.sources.iter().map(source).collect(),
-        strict: page.expected.is_some_and(|all| is_strict(case, all)),
+        // This is not possible with unasked zeros (9.9), which drives send without end.
+        strict: page.seen.received.len() <= case.bytes().len(),
         ..Scenario::new(page.title, header)
     });
     text.empty_line();
@@ -85,16 +77,8 @@ pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
             text.step(&RingStep::Fault(fault).into(), "");
         }
     }
-    if let Some(expected) = page.expected {
-        answers(&mut text, case, expected);
-    }
+    answers(&mut text, case, page);
     text.into()
-}
-
-/// Whether the scenario expects every byte that the ring returns. This is not possible with unasked zeros (9.9), which drives send
-/// without end.
-fn is_strict(case: &Case, expected: ExpectedBytes<'_>) -> bool {
-    expected.seen.received.len() <= case.bytes().len()
 }
 
 fn steps(text: &mut Text, act: &Act, case: &Case) {
@@ -189,8 +173,8 @@ fn kind(harm: Harm) -> LinkFaultKind {
 }
 
 /// Lines with what must be received: act by act, where a byte comes for a byte.
-fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
-    let received = &expected.seen.received;
+fn answers(text: &mut Text, case: &Case, page: &Surroundings<'_>) {
+    let received = &page.seen.received;
     let mut from = 0;
     let sent = sent(case);
     let roles = RingSize::new(u64::from(case.drives)).map(|size| roles(size, &sent));
@@ -200,7 +184,7 @@ fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
         for part in case.acts.iter().flat_map(|act| act.parts(case.drives)) {
             let (roles, sent) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
             let count = answering(roles.0, sent.0).count();
-            answer(text, case, from..from + count, expected);
+            answer(text, case, from..from + count, page);
             from += count;
             rest = (roles.1, sent.1);
         }
@@ -208,24 +192,19 @@ fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
     let step = 4 * ITEMS_A_LINE;
     while from < received.len() {
         let to = (from + step).min(received.len());
-        answer(text, case, from..to, expected);
+        answer(text, case, from..to, page);
         from = to;
     }
 }
 
-fn answer(
-    text: &mut Text,
-    case: &Case,
-    range: std::ops::Range<usize>,
-    expected: ExpectedBytes<'_>,
-) {
-    let received = &expected.seen.received;
-    let word = |index: usize| match expected.any.contains(&index) {
+fn answer(text: &mut Text, case: &Case, range: std::ops::Range<usize>, page: &Surroundings<'_>) {
+    let received = &page.seen.received;
+    let word = |index: usize| match page.any.contains(&index) {
         true => Byte::Any,
         false => Byte::Byte(received[index].1.byte),
     };
     // A byte with a time in front begins a line.
-    let timed = expected.timed.filter(|timed| range.contains(timed));
+    let timed = page.timed.filter(|timed| range.contains(timed));
     let middle = timed.unwrap_or(range.end);
     for (part, at) in [(range.start..middle, None), (middle..range.end, timed)] {
         let words: Vec<_> = part.map(word).collect();

@@ -1,7 +1,7 @@
 //! A case and its scenario are one.
 
 use super::{repeat, scope, scope_of, seed};
-use crate::explore::text::{ExpectedBytes, Surroundings, text};
+use crate::explore::text::{Surroundings, text};
 use crate::explore::{Case, CaseScope, Generator, MasterView, RingSetup, mutate, play};
 use crate::language::read::RingScenario;
 use crate::simulate::simulated;
@@ -37,13 +37,12 @@ fn cases_with(scope: &CaseScope, ring: usize, count: u64) -> Vec<Case> {
 fn scenario(case: &Case, setup: &RingSetup, seen: &MasterView) -> String {
     let page = Surroundings {
         title: "a case",
-        header: Some(&setup.header),
-        expected: Some(ExpectedBytes {
-            seen,
-            any: &[],
-            timed: None,
-        }),
-        ..Surroundings::default()
+        sources: &[],
+        header: &setup.header,
+        remarks: &[],
+        seen,
+        any: &[],
+        timed: None,
     };
     text(case, &page)
 }
