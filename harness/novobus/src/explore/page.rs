@@ -2,7 +2,6 @@
 
 use super::fuzz_case::sources;
 use super::html::{Explored, explored};
-use super::setup::planted_line;
 use crate::explore::Case;
 use crate::explore::Finding;
 use crate::explore::play;
@@ -108,8 +107,8 @@ fn shown(
     path: &Path,
 ) -> Result<ShownScenario, ExploreError> {
     let sources = sources(finding);
-    let text = Case::scenario(finding, &finding.difference.kind(), None, false)?;
-    let (text, mut outcome, traces) = played(finding, &text)?;
+    let text = Case::scenario(finding, &finding.difference.kind(), None, true)?;
+    let (mut outcome, traces) = played(&text)?;
     outcome.verdict = match finding.confirmed {
         true => Verdict::Failed,
         false => Verdict::Flaky,
@@ -161,23 +160,15 @@ fn drives(sizes: &[u8]) -> String {
     sizes.join(", ")
 }
 
-/// Plays the scenario of a finding, with what is planted.
-fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>), ExploreError> {
-    // The header ends with the first empty line.
-    let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
-    let planted = finding.setup.deviates.iter();
-    let planted: String = planted
-        .map(|deviation| format!("\n{}", planted_line(deviation)))
-        .collect();
-    let text = format!("{head}{planted}\n\n{steps}");
+fn played(text: &str) -> Result<(Outcome, Vec<Trace>), ExploreError> {
     let source = Source {
         name: "the ring under test".to_owned(),
-        text: text.as_str().into(),
+        text: text.into(),
     };
     let entry = RingScenario::new(source, None)?;
     let plan = &entry.plan;
     let mut link = simulated(plan);
     let outcome = run::play(plan, &mut link, AtMismatch::GoOn);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
-    Ok((text, outcome, traces))
+    Ok((outcome, traces))
 }
