@@ -5,9 +5,11 @@ use harness_bench::link::{
 };
 use harness_bench::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
+use harness_proto::nd21::bits::{flags2, selftest};
+use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
-use harness_sim::nd21::{Mode, OutputLevels, Stimulus};
+use harness_sim::nd21::{Mode, OutputLevels, Stimulus, set_parity};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
@@ -132,6 +134,19 @@ impl SimulatedLink {
     #[must_use]
     pub(crate) fn drive(&self, ring: usize, drive: u8) -> Option<&Drive> {
         self.ring(ring)?.drive(drive)
+    }
+
+    /// Lets a drive monitor time-outs from now on (ND21 14.10.2), and after each reset (14.3.6).
+    pub(crate) fn monitor(&mut self, ring: usize, drive: u8) {
+        let ring = self.bench.ring_mut(ring);
+        if let Some(drive) = ring.and_then(|ring| ring.drive_mut(drive)) {
+            let cells = drive.cells_mut();
+            let flags = cells.peek(ram::FLAGS2) | flags2::MONITORING;
+            let _set = cells.poke(ram::FLAGS2, flags);
+            let contents = cells.eeprom_mut();
+            contents[usize::from(ee::SELFTEST)] |= selftest::MONITORING;
+            set_parity(contents);
+        }
     }
 
     /// The shortest silence after which one of its drives detects a time-out, if it monitors the line (ND21 9.9).

@@ -369,7 +369,7 @@ fn harmed(byte: Both, harms: &[Harm]) -> Vec<Both> {
 }
 
 /// What the manual leaves open of the bus, the default first. Times of 9.9 are not among it: cases on ports have no time-outs.
-fn all_properties() -> Vec<Properties> {
+pub(super) fn all_properties() -> Vec<Properties> {
     let mut all = Vec::new();
     for empty_short_telegram in [EmptyShortTelegram::Accepted, EmptyShortTelegram::Error] {
         for short_address in [ShortAddress::NotAddressed, ShortAddress::KeptSum] {

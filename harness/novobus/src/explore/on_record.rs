@@ -1,18 +1,24 @@
 //! Attempts on a ring with ports as a finding keeps them, and judged again from there.
 
-use super::case::{Act, Case};
+use super::case::{Act, Case, Harm};
 use super::judge::{BytesExchanged, Judge};
 use super::on_rig::LONGEST_HISTORY;
 use super::oracle::{Difference, sent};
+use super::setup::RingSetup;
 use crate::explore::{Rehearsal, Tried};
-use crate::twin;
+use crate::language::syntax::{DriveRange, Setup as HeaderLine, SetupKind};
+use crate::twin::{self, Conversation, Done, Exactness, Twin};
 use harness_bench::explore::{ExploreError, Target};
+use harness_bench::link::{Moment, PlacedFault};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::Role;
 use harness_proto::time::{Instant, Span};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::VecDeque;
+
+/// How late bytes may be read where a silence explains them. Their times are judged apart from their values.
+const LATEST: Span = Span::from_millis(1_000);
 
 /// An attempt at a case, with all that its difference rests on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,9 +97,7 @@ impl AttemptRecord {
         let exchange = BytesExchanged::of(&last.case, last.received.clone());
         let found = judge.see(exchange);
         let found = found.or_else(|| untimely(&last.case, &last.received, &self.times));
-        let silenced =
-            |found: &Difference| self.may_monitor && is_silenced(last, &self.times, found);
-        found.filter(|found| !self.known && !silenced(found))
+        found.filter(|_| !self.known && !self.is_silenced())
     }
 }
 
@@ -140,44 +144,88 @@ pub(super) fn untimely(
     }))
 }
 
-/// Whether drives that may monitor time-outs have missed their bytes in front of a difference, because the bench was silent or late
-/// (ND21 9.9).
-pub(super) fn is_silenced(last: &AnsweredCase, times: &ByteTimes, found: &Difference) -> bool {
-    let AnsweredCase { case, received } = last;
-    let (Ok(size), Some(index)) = (
-        RingSize::new(u64::from(case.drives)),
-        found.byte.and_then(|byte| byte.checked_sub(1)),
-    ) else {
-        return false;
-    };
-    let (places, _) = twin::answered(size, &sent(case));
-    let starts = places.iter().map_while(|place| times.sent.get(*place));
-    let answered: Vec<_> = starts.copied().map(at).collect();
-    let all: Vec<_> = times.sent.iter().copied().map(at).collect();
-    let way = Span::from_units(times.byte.saturating_mul(u64::from(case.drives) + 1));
-    let received = times
-        .came
-        .iter()
-        .copied()
-        .map(at)
-        .zip(received.iter().copied());
-    let received: Vec<_> = received.collect();
-    // Where nothing differs the model expects what came.
-    let expected = answered.iter().zip(&received).enumerate();
-    let expected = expected.map(|(place, (start, (_, came)))| match place < index {
-        true => (*start + way, *came),
-        false => (*start + way, Received::good(!came.byte)),
-    });
-    let expected: Vec<_> = expected.collect();
-    let sent = twin::SentTimes {
-        answered: &answered,
-        all: &all,
-        way,
-        earliest: twin::EARLIEST_TIME_OUT,
-        complete: false,
-    };
-    let excused = sent.excused_from(size, &expected, &received, index, true, true);
-    excused.is_some_and(|from| received.get(index).is_none_or(|(came, _)| *came >= from))
+/// The properties that [`AttemptRecord::possible`] numbers, from the highest bit.
+const OPEN: [(&str, &str); 4] = [
+    ("empty-short-telegram", "error"),
+    ("short-address", "kept-sum"),
+    ("read-long", "as-printed"),
+    ("broken-sequence", "forwarded"),
+];
+
+impl AttemptRecord {
+    /// Whether right drives that monitor time-outs have sent what came, if they have heard a longer silence than the bench has noted (ND21
+    /// 9.9).
+    pub(super) fn is_silenced(&self) -> bool {
+        let Self { before, last, .. } = self;
+        let (drives, Ok(size)) = (last.case.drives, RingSize::new(u64::from(last.case.drives)))
+        else {
+            return false;
+        };
+        let exactness = Exactness {
+            tolerance: LATEST,
+            line_errors: self.line_errors,
+            knows_cells: false,
+            looks: None,
+        };
+        let byte = Span::from_units(self.times.byte);
+        let explained = |place: &u8| {
+            let lines = (0..).zip(OPEN).filter(|(bit, _)| place & (8 >> bit) != 0);
+            let lines = lines.map(|(_, (name, word))| {
+                HeaderLine::new(DriveRange::all(0), SetupKind::word(name, word))
+            });
+            let mut setup = RingSetup::of_ports(1);
+            setup.header.setups.extend(lines);
+            let Ok(link) = setup.model(&[drives]) else {
+                return false;
+            };
+            let mut twin = Twin::new(link, &[size]);
+            twin.rest_through_self_tests();
+            for answered in before {
+                let ideal = ByteTimes::ideal(answered, byte);
+                let _alike = twin.follow(&answered.conversation(&ideal), exactness);
+            }
+            let comparison = twin.follow(&last.conversation(&self.times), exactness);
+            comparison.silenced
+        };
+        self.may_monitor && self.possible.iter().any(explained)
+    }
+}
+
+impl ByteTimes {
+    /// Those of bytes that follow one another without a gap.
+    fn ideal(answered: &AnsweredCase, byte: Span) -> Self {
+        let way = u64::from(answered.case.drives) + 1;
+        let times =
+            |first: u64, count: usize| (first..).take(count).map(|place| byte.units() * place);
+        Self {
+            byte: byte.units(),
+            tolerance: 0,
+            sent: times(0, answered.case.bytes().len()).collect(),
+            came: times(way, answered.received.len()).collect(),
+        }
+    }
+}
+
+impl AnsweredCase {
+    /// What went and came, as a conversation of the ring alone.
+    fn conversation(&self, times: &ByteTimes) -> Conversation {
+        let fault = |(link, byte, harm): (u8, u64, Harm)| {
+            let fault = PlacedFault::Link(usize::from(link), harm.fault());
+            Done::Fault(Instant::START, fault, Moment::Byte(byte))
+        };
+        let faults = self.case.faults().into_iter().map(fault);
+        let sent = times.sent.iter().zip(self.case.bytes());
+        let sent = sent.map(|(start, byte)| Done::Sent(at(*start), byte));
+        let received = times.came.iter().zip(&self.received);
+        let received: Vec<_> = received.map(|(came, byte)| (0, at(*came), *byte)).collect();
+        let last = times.sent.iter().chain(&times.came).max();
+        Conversation {
+            done: faults.chain(sent).map(|done| (0, done)).collect(),
+            received,
+            end: last.map_or(Instant::START, |last| at(*last)),
+            unwatched: Vec::new(),
+        }
+    }
 }
 
 fn at(units: u64) -> Instant {
@@ -267,47 +315,61 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Received>, D::
 
 #[cfg(test)]
 mod tests {
-    use super::super::judge::prologue;
+    use super::super::judge::{all_properties, prologue};
     use super::*;
+    use harness_proto::novobus::properties::{Properties, Setting};
 
-    /// ND21 9.9: drives that monitor time-outs answer with zeros after a silence of the bench. Zeros behind none are a drive's fault.
+    /// ND21 9.9: drives that monitor time-outs answer with zeros after a silence of the bench. Zeros after none, and other bytes, are a drive's
+    /// fault.
     #[test]
-    fn only_a_silence_excuses_zeros() {
+    fn only_what_drives_send_after_a_silence_is_silenced() {
         let case = prologue(3, None);
         let count = case.bytes().len() as u64;
         let byte = Span::from_micros(286).units();
-        let silenced = |silence: Span| {
+        let silenced = |silence: Span, wrong: u8, may_monitor: bool| {
             let sent: Vec<u64> = (0..count)
                 .map(|place| place * byte + if place < 3 { 0 } else { silence.units() })
                 .collect();
-            let mut came: Vec<_> = sent.iter().map(|sent| sent + 4 * byte).collect();
-            let mut received: Vec<_> = case.bytes().into_iter().map(Received::good).collect();
-            received[3..].fill(Received::good(0));
-            came.truncate(received.len());
+            let right = RingSetup::of_ports(1).model_answers(&case).expect("a ring");
+            let mut received: Vec<_> = right.received.iter().map(|(_, byte)| *byte).collect();
+            received[3..].fill(Received::good(wrong));
             let times = ByteTimes {
                 byte,
                 tolerance: Span::from_millis(20).units(),
+                came: sent.iter().map(|sent| sent + 4 * byte).collect(),
                 sent,
-                came,
             };
-            let last = AnsweredCase {
-                case: case.clone(),
-                received,
+            let record = AttemptRecord {
+                possible: vec![0],
+                line_errors: true,
+                before: Vec::new(),
+                last: AnsweredCase {
+                    case: case.clone(),
+                    received,
+                },
+                played: true,
+                may_monitor,
+                known: false,
+                times,
             };
-            let found = Difference::from(&twin::Divergence {
-                ring: 0,
-                byte: 4,
-                what: twin::Symptom::Value,
-                expected: None,
-                received: None,
-                role: Role::Foreign,
-                rule: Role::Foreign.rule(),
-                step: None,
-                drive: None,
-            });
-            is_silenced(&last, &times, &found)
+            record.is_silenced()
         };
-        assert!(silenced(Span::from_millis(12)));
-        assert!(!silenced(Span::from_millis(1)));
+        let (long, short) = (Span::from_millis(12), Span::from_millis(1));
+        assert!(silenced(long, 0, true));
+        assert!(!silenced(long, 0x55, true));
+        assert!(!silenced(long, 0, false));
+        assert!(!silenced(short, 0, true));
+    }
+
+    /// Each number of an attempt names the same properties for the judge and for a ring that is made of it.
+    #[test]
+    fn numbers_of_properties_are_those_of_the_judge() {
+        for (place, wanted) in (0u8..).zip(all_properties()) {
+            let mut made = Properties::default();
+            for (_, (name, word)) in (0..).zip(OPEN).filter(|(bit, _)| place & (8 >> bit) != 0) {
+                made.set(name, Setting::Word(word)).expect("a property");
+            }
+            assert_eq!(made, wanted, "{place}");
+        }
     }
 }

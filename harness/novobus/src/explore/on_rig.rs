@@ -3,7 +3,7 @@
 
 use super::case::{ActKind, Case, Harm, OtherRing};
 use super::judge::{BytesExchanged, Judge, prologue};
-use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, is_silenced, untimely};
+use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, untimely};
 use super::order::{CommandSent, RawCommand};
 use super::play::MasterView;
 use crate::explore::features;
@@ -254,10 +254,10 @@ impl Target<Case> for OnRig<'_, '_> {
                 case: case.clone(),
                 received,
             };
-            let may_monitor = self.may_monitor();
-            let silenced = tried
-                .difference
-                .take_if(|found| may_monitor && is_silenced(&answered, &times, found));
+            let mut record = self.record(case);
+            record.before.clone_from(&self.history[ring]);
+            (record.last, record.times) = (answered.clone(), times);
+            let silenced = tried.difference.take_if(|_| record.is_silenced());
             tried.not_played = silenced.as_ref().map(|_| SILENCED.to_owned());
             // A known deviation of the rig's file explains it.
             let deviations = &self.run.session().rig().file.deviation;
@@ -268,11 +268,11 @@ impl Target<Case> for OnRig<'_, '_> {
                 known.any(|entry| entry.explains(&rule, found.ring, drive))
             });
             tried.before = (tried.difference.is_some() && !before.is_empty()).then_some(before);
-            self.history[ring].push(answered.clone());
-            if let Some((record, _)) = &mut self.last {
-                (record.last, record.times) = (answered, times);
-                (record.played, record.known) = (true, known.is_some());
+            if let Some((last, _)) = &mut self.last {
+                last.last.received.clone_from(&answered.received);
+                (last.times, last.played, last.known) = (record.times, true, known.is_some());
             }
+            self.history[ring].push(answered);
             // For how long a drive tests itself is its choice (ND21 11.8).
             let disturbed = silenced.is_some() || known.is_some() || tried.difference.is_some();
             self.stale = disturbed || case.orders().any(resets);

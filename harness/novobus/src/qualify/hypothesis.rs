@@ -1,7 +1,7 @@
 //! Hypotheses, judged by what their twins answer.
 
 use crate::language::syntax::Header;
-use crate::twin::{Conversation, Exactness, Twin};
+use crate::twin::{Conversation, Exactness, Silences, Twin};
 use harness_proto::time::Span;
 
 /// A model with something changed.
@@ -72,7 +72,7 @@ pub(super) fn fit(
         timely: true,
         ..Fit::default()
     };
-    for comparison in twin.follow_while_alike(conversations, exactness) {
+    for comparison in twin.follow_while_alike(conversations, exactness, Silences::Noted) {
         evidence.compared += comparison.compared;
         if comparison.divergence.is_some() {
             return Err(evidence.compared);

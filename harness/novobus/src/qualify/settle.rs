@@ -3,7 +3,7 @@
 use super::hypothesis::{Fit, Hypothesis, explaining};
 use super::probes::{Asked, Probe, hypotheses};
 use crate::language::syntax::{DriveRange, Header, Setup, SetupKind};
-use crate::twin::{Conversation, Exactness, Twin};
+use crate::twin::{Conversation, Exactness, Silences, Twin};
 use harness_bench::scenario::times::Duration;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
@@ -259,7 +259,7 @@ enum Explained {
 }
 
 fn explained(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Explained {
-    let comparisons = twin.follow_while_alike(conversations, exactness);
+    let comparisons = twin.follow_while_alike(conversations, exactness, Silences::Noted);
     let Some(found) = comparisons.into_iter().find_map(|c| c.divergence) else {
         return Explained::Whole;
     };

@@ -8,7 +8,7 @@ use crate::choice::{Choice, SELF_TEST_TIME, of_drives, of_self_tests, of_the_bus
 use crate::language::syntax::{DriveRange, Header};
 use crate::language::write::ring_prefix;
 use crate::rig::run::twin;
-use crate::twin::{Comparison, Conversation, Divergence, Done};
+use crate::twin::{Comparison, Conversation, Divergence, Done, Silences};
 use harness_bench::scenario::times::Duration;
 use harness_proto::time::Span;
 
@@ -37,16 +37,22 @@ pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
     if !real {
         return None;
     }
-    let (mut first, monitored) = compare(&Header::default(), facts).err()?;
+    let mut ways = [Silences::Noted, Silences::Longer].into_iter();
+    ways.find_map(|silences| explained(facts, silences))
+}
+
+fn explained(facts: &AttemptFacts<'_>, silences: Silences) -> Option<Explanation> {
+    let compare = |header: &Header| compare(header, facts, silences);
+    let (mut first, monitored) = compare(&Header::default()).err()?;
     let mut open = choices(facts);
     open.retain(|choice| choice.property != TIME_OUT || monitored);
     let (mut header, mut chosen, mut time_outs) = (Header::default(), Vec::new(), true);
     // Each choice explains more bytes than those before it.
     loop {
         let mut further = None;
-        for (choice, whose, more) in candidates(&open, &first, &header, facts) {
+        for (choice, whose, more) in candidates(&open, &first, &header, facts, &compare) {
             let all = header.and(&more);
-            match compare(&all, facts) {
+            match compare(&all) {
                 // It moves the model's bytes so that they seem to be late, and explains nothing.
                 Ok(comparisons)
                     if silence(&comparisons).is_some_and(|silence| !silence.is_after(&first))
@@ -96,6 +102,9 @@ impl FirstDifference {
     }
 }
 
+/// Comparisons, or where they first differ and whether a drive monitors.
+type Compared = Result<Vec<Comparison>, (FirstDifference, bool)>;
+
 fn compared(comparisons: &[Comparison]) -> u64 {
     comparisons.iter().map(|result| result.compared).sum()
 }
@@ -116,6 +125,7 @@ fn candidates<'c>(
     first: &FirstDifference,
     header: &Header,
     facts: &AttemptFacts<'_>,
+    compare: &dyn Fn(&Header) -> Compared,
 ) -> Vec<(&'c Choice, String, Header)> {
     let rings = || facts.way.rings.iter().enumerate();
     let every = |choice: &Choice| choice.in_all(facts.way.rings.len());
@@ -125,7 +135,7 @@ fn candidates<'c>(
         .collect();
     for choice in open {
         let whole = header.and(&every(choice));
-        let tells = match compare(&whole, facts) {
+        let tells = match compare(&whole) {
             Ok(comparisons) => silence(&comparisons).is_some(),
             Err((place, _)) => place != *first,
         };
@@ -202,10 +212,7 @@ fn silent_for(conversations: &[Conversation]) -> Option<Duration> {
 ///
 /// # Errors
 /// Where it first differs, and whether one of the drives monitors time-outs.
-fn compare(
-    header: &Header,
-    facts: &AttemptFacts<'_>,
-) -> Result<Vec<Comparison>, (FirstDifference, bool)> {
+fn compare(header: &Header, facts: &AttemptFacts<'_>, silences: Silences) -> Compared {
     (facts.alive)();
     let Ok(mut twin) = twin(facts.rig, &known(facts.rig).and(header)) else {
         let nowhere = FirstDifference {
@@ -215,7 +222,7 @@ fn compare(
         };
         return Err((nowhere, false));
     };
-    let comparisons = twin.follow_while_alike(facts.conversations, facts.exactness);
+    let comparisons = twin.follow_while_alike(facts.conversations, facts.exactness, silences);
     let conversation = comparisons.len();
     // What differs after a silence of the bench says nothing about a choice.
     let last = comparisons.last().filter(|result| !result.silenced);

@@ -199,6 +199,25 @@ fn a_choice_that_moves_the_model_excuses_no_wrong_byte() {
     judged("drive 1 deviates writes-ignored\n", Failed);
 }
 
+/// ND21 9.9: bytes that come back before they can show that the bench noted wrong times, and drives that monitor may have heard a longer silence
+/// than it knows. After any silence they send zeros and their numbers, and not a wrong checking byte.
+#[test]
+fn a_silence_excuses_nothing_that_no_right_drive_sends_after_one() {
+    let judged = |wrong: &str| {
+        let scenario = "drive 0..last memory Flags2 = 04\nread-byte 0 Flags2\nread-byte 1 FE13\n";
+        let plan = plan(format!("title x\nring 3\n{scenario}"));
+        let way = Way {
+            rings: plan.rings.clone(),
+            attempts: None,
+            anew: true,
+        };
+        let early = Span::from_millis(6);
+        judged_early(&mut link(wrong), "", (&plan, &way), &|_, _| {}, (early, 0)).verdict
+    };
+    assert_ne!(judged(""), Failed);
+    assert_eq!(judged("drive 1 deviates checksum-wrong\n"), Failed);
+}
+
 /// ND21 9.8: a check sequence that comes back whole ends what a silence may have begun. Behind a fault of the scenario it is not known whether
 /// the drives monitor time-outs (14.3.6), and the zeros of the bench's own check sequences are no sign that they do.
 #[test]

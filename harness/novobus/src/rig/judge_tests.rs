@@ -255,6 +255,7 @@ fn a_race_excuses_nothing_elsewhere() {
         ring,
         at: Instant::START,
         until,
+        answers: 0,
     };
     let race = |ring: usize| ended(ring, None);
     let verdict = |change: Change<'_>| judged_with("", "", &scenario, change).verdict;

@@ -7,7 +7,8 @@ use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::places::{answered, collapsed, heard, known_places, what_of};
 use super::rows::{Rows, answer_of};
-use super::unasked::{SentTimes, after_a_race};
+use super::silence::answers_in_race;
+use super::unasked::{Race, SentTimes, after_a_race};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
 use harness_proto::nd21::{own, ram};
@@ -28,8 +29,6 @@ pub(crate) struct Comparer<'a> {
     pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
     pub(crate) recording: BTreeSet<(usize, u8)>,
-    /// Shortest silence after which a drive that monitors detects a time-out.
-    pub(crate) earliest_time_out: Span,
     /// As [`Conversation::unwatched`].
     pub(crate) unwatched: &'a [(Instant, Instant)],
     pub(crate) comparison: Comparison,
@@ -62,7 +61,6 @@ impl Comparer<'_> {
         let way = self.byte_time * (u64::from(size.drives()) + 1);
         let starts = conversation.sent_at(ring);
         let all = answered(size, &sent);
-        let asked_for = all.0.len();
         let (places, roles) = heard(all, &starts, expected, way);
         let answered: Vec<u8> = places.iter().map(|place| sent[*place].0).collect();
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
@@ -77,26 +75,29 @@ impl Comparer<'_> {
             answered: &answered_at,
             all: &starts,
             way,
-            earliest: self.earliest_time_out,
-            complete: expected.len() >= asked_for,
         };
         let monitors = self.monitoring(ring, size).any(|does| does == Some(true));
         let tolerance = self.exactness.tolerance;
         let race = || times.judge(size, answer, received, tolerance, monitors);
         let unasked = real_time.then(race).flatten();
-        let may = self.comparison.monitored || self.knowledge.may_monitor(ring, size);
-        let monitored = self.comparison.monitored;
+        // Bytes that come one way round the ring after those of the master answer one by one.
+        let in_step = |race: &Race| {
+            let answers = expected.iter().zip(&answered_at).take(race.first);
+            let all = answers.clone().count() == race.first;
+            all && answers
+                .into_iter()
+                .all(|((due, _), start)| *due == *start + way)
+        };
+        let known = match &unasked {
+            Some(race) if in_step(race) => known.max(race.first),
+            _ => known,
+        };
         // No byte from the first unasked one on answers one of the master's.
         let asked = unasked
             .as_ref()
             .map_or(roles.len(), |race| race.first.min(roles.len()));
         let whole = (expected, &received[..]);
         let in_place = aligned || unasked.is_some() || !real_time;
-        // The bytes before a place that differs are right.
-        let excused = |index: usize| {
-            let right = if in_place { index } else { 0 };
-            times.excused_from(size, whole.0, whole.1, right, may, monitored)
-        };
         let (shorter, short);
         // A race of clocks is compared up to its first byte, and the long runs after it do not matter.
         let (expected, received) = if in_place {
@@ -133,10 +134,12 @@ impl Comparer<'_> {
             let mut index = index;
             if let Some(race) = race {
                 let at = received.get(index).or(expected.get(index));
+                let of_the_model = expected.get(index..).unwrap_or(&[]);
                 let first = at.map(|(at, _)| UnaskedByte {
                     ring,
                     at: *at,
                     until: None,
+                    answers: answers_in_race(of_the_model, size),
                 });
                 self.comparison.unasked.extend(first);
                 if let (None, Some((place, fault))) = (&what, &race.fault) {
@@ -193,9 +196,6 @@ impl Comparer<'_> {
                 return;
             }
             if self.comparison.divergence.is_none() {
-                let after = |from| found.received.is_none_or(|(at, _)| at >= from);
-                let excused = real_time.then(|| excused(index)).flatten();
-                self.comparison.silenced = excused.is_some_and(after);
                 self.comparison.divergence = Some(found);
             }
             return;

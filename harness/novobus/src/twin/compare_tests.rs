@@ -72,7 +72,6 @@ fn rows(
         byte_time: Span::from_micros(286),
         knowledge,
         recording: BTreeSet::new(),
-        earliest_time_out: Span::from_millis(10),
         comparison: Comparison::default(),
     };
     let rows = Rows {

@@ -181,6 +181,8 @@ pub(crate) struct UnaskedByte {
     pub at: Instant,
     /// When the first byte came after a check sequence with which the bytes are compared again.
     pub until: Option<Instant>,
+    /// How many bytes the model sends after it, up to a check sequence, that are neither zeros nor numbers of drives (ND21 9.7).
+    pub answers: usize,
 }
 
 impl Comparison {

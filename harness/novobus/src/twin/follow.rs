@@ -3,6 +3,7 @@
 use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
+use super::silence::SeenRing;
 use super::unasked::EARLIEST_TIME_OUT;
 use crate::link::BesideTheBus;
 use crate::link::SimulatedLink;
@@ -11,11 +12,24 @@ use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
 /// How long a twin in real time listens after its conversation: bytes of the ring may arrive a moment before those of its twin.
 const SLACK: Span = Span::from_millis(1);
+
+/// The largest ring in which drives are tried one by one.
+const SMALL: usize = 16;
+
+/// Which silences drives may have heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Silences {
+    /// Those that the bench has noted.
+    Noted,
+    /// Longer ones as well, where they explain a difference.
+    Longer,
+}
 
 /// An act of the bench on a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -215,11 +229,80 @@ impl Twin {
         conversation: &Conversation,
         exactness: Exactness,
     ) -> Comparison {
-        self.follow_rings(conversation, exactness, &BTreeSet::new())
+        self.follow_rings(conversation, exactness, &BTreeSet::new(), Silences::Longer)
     }
 
-    /// As [`Self::follow`], without comparing some rings.
+    /// As [`Self::follow`], without comparing some rings. Where silences may be longer than the bench has noted, those are tried that explain a
+    /// difference.
     fn follow_rings(
+        &mut self,
+        conversation: &Conversation,
+        exactness: Exactness,
+        left_out: &BTreeSet<usize>,
+        silences: Silences,
+    ) -> Comparison {
+        let longer = silences == Silences::Longer && exactness.tolerance > Span::ZERO;
+        let before = longer.then(|| self.clone());
+        let mut comparison = self.compare(conversation, exactness, left_out);
+        if let (Some(before), Some(found)) = (before, &comparison.divergence) {
+            let mut races = comparison.unasked.iter().rev();
+            let mut here = races.by_ref().filter(|race| race.ring == found.ring);
+            let ring = SeenRing {
+                ring: found.ring,
+                size: self.sizes[found.ring],
+                byte_time: self.link.byte_time(),
+                earliest: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
+                after_a_race: here.find_map(|race| race.until),
+            };
+            let heard = ring.held_back(conversation, found);
+            let monitored = comparison.monitored;
+            comparison.silenced = before.with_monitors(found.ring, monitored, |twin| {
+                heard.iter().any(|heard| {
+                    let mut twin = twin.clone();
+                    twin.rest(found.ring, heard.rest);
+                    let comparison = twin.compare(&heard.conversation, exactness, left_out);
+                    comparison.divergence.is_none() && ring.is_in_error(conversation, &comparison)
+                })
+            });
+        }
+        comparison
+    }
+
+    /// Whether something holds for a twin in which drives of a ring monitor time-outs (ND21 14.10.2): those of the model, if one has
+    /// `monitored`; all of which it is not known; or one of these.
+    fn with_monitors(&self, ring: usize, monitored: bool, holds: impl Fn(&Self) -> bool) -> bool {
+        let drives = 0..self.sizes[ring].drives();
+        let is_unknown = |drive: &u8| self.knowledge.monitors(ring, *drive).is_none();
+        let unknown: Vec<_> = drives.filter(is_unknown).collect();
+        let alone = unknown
+            .chunks(1)
+            .filter(|_| (2..=SMALL).contains(&unknown.len()));
+        let mut some = std::iter::once(&unknown[..]).chain(alone);
+        monitored && holds(self)
+            || some.any(|drives| {
+                let mut twin = self.clone();
+                let monitor = |drive: &u8| twin.link.monitor(ring, *drive);
+                drives.iter().for_each(monitor);
+                !drives.is_empty() && holds(&twin)
+            })
+    }
+
+    /// Lets a silence pass. Drives monitor from the first byte on that they hear (ND21 9.9).
+    fn rest(&mut self, ring: usize, silence: Span) {
+        if silence == Span::ZERO {
+            return;
+        }
+        let drives = 0..self.sizes[ring].drives();
+        let mut drives = drives.filter_map(|drive| self.link.drive(ring, drive));
+        if drives.all(|drive| drive.bus_end().due(|| true).is_none()) {
+            self.link.begin();
+            self.link.send_octets(ring, &[SYNCO]);
+        }
+        self.link.run_until(self.link.now() + silence);
+    }
+
+    /// Plays a conversation and compares the bytes received with those of the twin, but for those of some rings.
+    fn compare(
         &mut self,
         conversation: &Conversation,
         exactness: Exactness,
@@ -240,7 +323,6 @@ impl Twin {
             byte_time: self.link.byte_time(),
             knowledge: &mut self.knowledge,
             recording,
-            earliest_time_out: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
             unwatched: &conversation.unwatched,
             comparison: Comparison {
                 monitored,
@@ -292,7 +374,8 @@ impl Twin {
             if left_out.len() == self.sizes.len() {
                 break;
             }
-            let comparison = self.follow_rings(conversation, exactness, &left_out);
+            let comparison =
+                self.follow_rings(conversation, exactness, &left_out, Silences::Longer);
             left_out.extend(comparison.open_races());
             comparisons.push(comparison);
         }
@@ -305,10 +388,11 @@ impl Twin {
         &mut self,
         conversations: &[Conversation],
         exactness: Exactness,
+        silences: Silences,
     ) -> Vec<Comparison> {
-        let mut comparisons = Vec::new();
+        let (mut comparisons, whole) = (Vec::new(), BTreeSet::new());
         for conversation in conversations {
-            let comparison = self.follow(conversation, exactness);
+            let comparison = self.follow_rings(conversation, exactness, &whole, silences);
             let last = comparison.divergence.is_some() || comparison.open_races().next().is_some();
             comparisons.push(comparison);
             if last {

@@ -9,7 +9,6 @@ use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
-use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, PAGE};
 use harness_proto::novobus::output::Output;
 use harness_proto::time::{Instant, Span};
@@ -216,11 +215,6 @@ impl Knowledge {
         self.working.remove(&(ring, drive));
         self.ordered.retain(|place, _| !of_it(place));
         self.trusting.remove(&(ring, drive));
-    }
-
-    /// Whether a drive of a ring may monitor time-outs: it is a setting of its EEPROM (14.3.6), which is loaded at a reset.
-    pub(crate) fn may_monitor(&self, ring: usize, size: RingSize) -> bool {
-        (0..size.drives()).any(|drive| !self.trusting.contains(&(ring, drive)))
     }
 
     /// Whether a drive monitors time-outs, where that is known.

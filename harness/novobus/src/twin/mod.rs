@@ -13,14 +13,15 @@ mod known;
 mod places;
 mod program;
 mod rows;
+mod silence;
 mod unasked;
 
 pub(crate) use compare::unknowable;
 pub(crate) use comparison::{
     Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, UnaskedByte,
 };
-pub(crate) use follow::{Conversation, Done, Twin};
+pub(crate) use follow::{Conversation, Done, Silences, Twin};
 #[cfg(test)]
 pub(crate) use harness_proto::novobus::role::Role;
 pub(crate) use places::{answered, answering, what_of};
-pub(crate) use unasked::{EARLIEST_TIME_OUT, SILENCED, SentTimes};
+pub(crate) use silence::SILENCED;

@@ -12,7 +12,7 @@ use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
 
 /// How many bytes the longest answer has (10.1). A run of that many zeros is not an answer.
-const LONGEST_ANSWER: usize = 6;
+pub(super) const LONGEST_ANSWER: usize = 6;
 
 /// What a ring sent back, beside what its twin received.
 pub(super) struct Rows<'a> {

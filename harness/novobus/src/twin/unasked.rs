@@ -2,17 +2,14 @@
 //!
 //! The number of zeros before another byte, and which drive sends the first zero, depend on the clocks of the drives, which no model
 //! knows. From the first unasked byte to the next byte of the master, only properties that hold for every order are checked.
-//!
-//! A bench that stands still leaves the line silent. Drives that monitor time-outs miss their bytes then, and that is not their fault. The
-//! same holds for drives of which it is not known whether they monitor: it is a setting (14.3.6).
 
 use super::comparison::Symptom;
 use super::follow::{Conversation, Done, TwinBytes};
 use super::places::answered;
-use harness_bench::link::HARMLESS;
+use super::silence::EARLY;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
+use harness_proto::novobus::check_sequence::SEQUENCE;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 
@@ -21,13 +18,6 @@ const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
 /// Shortest silence after which a drive that monitors detects a time-out (ND21 9.9). A model that deviates may detect one earlier.
 pub(crate) const EARLIEST_TIME_OUT: Span = Span::from_millis(10);
-
-/// How long in front of unasked bytes the silence may have begun that they come from: it lasts 20 ms at most, and a drive waits for 10 ms
-/// more. Twice as long is certain.
-const BEFORE_ZEROS: Span = Span::from_millis(60);
-
-/// Maximum time by which a byte is earlier over a socket that keeps a line's times than on a line.
-const EARLY: Span = Span::from_millis(1);
 
 /// Maximum error of the clocks of the bench and of a drive over the time of a time-out.
 const CLOCKS: Span = Span::from_micros(500);
@@ -38,10 +28,6 @@ const PUNCTUAL: usize = 16;
 
 /// A byte and when it came.
 type TimedByte = (Instant, Received);
-
-/// Why a difference after a silence of the bench accuses no drive.
-pub(crate) const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
-    (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
 
 /// A race of clocks, which begins at the first byte that was sent unasked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,10 +48,6 @@ pub(crate) struct SentTimes<'a> {
     pub(crate) all: &'a [Instant],
     /// Time from the start of a byte to its answer.
     pub(crate) way: Span,
-    /// Shortest silence after which a drive that monitors detects a time-out.
-    pub(crate) earliest: Span,
-    /// Whether the model answers each byte.
-    pub(crate) complete: bool,
 }
 
 impl SentTimes<'_> {
@@ -76,126 +58,6 @@ impl SentTimes<'_> {
             early && *at >= from
         };
         received.iter().enumerate().position(unasked)
-    }
-
-    /// The time from which on the bench itself may be the cause of a difference. The bytes before `right` do not differ: they are as expected, or
-    /// the drives' choice. If drives `may` monitor time-outs, they miss bytes while the bench is silent or late. If the model `does`, it is wrong
-    /// about the time of a silence when the bench was late.
-    pub(crate) fn excused_from(
-        &self,
-        size: RingSize,
-        expected: &[TimedByte],
-        received: &[TimedByte],
-        right: usize,
-        may: bool,
-        does: bool,
-    ) -> Option<Instant> {
-        if self.nothing_was_missed(expected, received, right) {
-            return None;
-        }
-        let missed = may.then(|| self.timed_out(size, expected, received, right));
-        let early = (may && self.complete).then(|| self.early(expected, received));
-        let late = || (0..received.len()).find(|index| is_late(expected, received, *index));
-        let late = does.then(late);
-        let all = missed.into_iter().chain(early).chain(late);
-        let first = all.flatten().min()?;
-        Some(received[first].0)
-    }
-
-    /// The first byte that is as expected and came back before it was sent: the bench was late, and does not know how long the line was silent.
-    fn early(&self, expected: &[TimedByte], received: &[TimedByte]) -> Option<usize> {
-        let value = |heard: &[TimedByte], index: usize| heard.get(index).map(|(_, byte)| *byte);
-        let same = |index: &usize| value(expected, *index) == value(received, *index);
-        let early = |index: &usize| {
-            let start = self.answered.get(*index);
-            start.is_some_and(|start| received[*index].0 + HARMLESS < *start + self.way)
-        };
-        (0..received.len()).take_while(same).find(early)
-    }
-
-    /// Whether the bytes came back so close together, up to the first that differs, that no drive can have missed one. On a line no byte leaves
-    /// before the bench sends it, and none comes back before it has been round the ring. So no drive is without a byte for longer than from the
-    /// start of one to the return of the next, less the way round. A computer that is late makes these spans longer, and never shorter. A ring
-    /// behind a socket may take bytes before their time; they come back early then.
-    fn nothing_was_missed(
-        &self,
-        expected: &[TimedByte],
-        received: &[TimedByte],
-        right: usize,
-    ) -> bool {
-        let value = |heard: &[TimedByte], index: usize| heard.get(index).map(|(_, byte)| *byte);
-        let same = |index: usize| index < right || value(expected, index) == value(received, index);
-        let Some(first) = (0..received.len()).find(|index| !same(*index)) else {
-            return false;
-        };
-        let from = received[first].0 - BEFORE_ZEROS;
-        let close = |index: usize| {
-            let before = index.checked_sub(1).and_then(|at| self.answered.get(at));
-            let silence = |start: &Instant| received[index].0.since(*start + self.way);
-            before.is_some_and(|start| silence(start) + EARLY < self.earliest)
-        };
-        let due = |index: usize| {
-            let start = self.answered.get(index);
-            start.is_some_and(|start| received[index].0 + EARLY >= *start + self.way)
-        };
-        let begins = received.partition_point(|(at, _)| *at < from);
-        begins > 0 && (begins..first).all(due) && (begins..=first).all(close)
-    }
-
-    /// The first byte of the zeros and addresses of drives that have missed their master (ND21 9.9): in front of the byte that it
-    /// answers, the bench left the line silent or was late. A check sequence after it that comes back whole, with nothing other than
-    /// expected from there to its end, takes every drive out of the error mode (9.8): the drives have missed nothing then.
-    fn timed_out(
-        &self,
-        size: RingSize,
-        expected: &[TimedByte],
-        received: &[TimedByte],
-        right: usize,
-    ) -> Option<usize> {
-        let silent = |index: usize| {
-            let start = self.answered.get(index)?;
-            let before = self.all.partition_point(|at| at < start).checked_sub(1)?;
-            Some(start.since(self.all[before]) > HARMLESS)
-        };
-        // No answer comes before it has been round the ring.
-        let early = |index: usize| {
-            let start = self.answered.get(index);
-            start.is_none_or(|start| received[index].0 < *start + self.way)
-        };
-        let begins = |index: &usize| {
-            early(*index) || is_late(expected, received, *index) || silent(*index).unwrap_or(true)
-        };
-        let spelled = |(_, byte): &TimedByte| byte.error.is_none() && byte.byte < size.drives();
-        // How many of them come from a byte on, and whether nothing else comes after them. The check sequence begins with some too.
-        let mut run = 0;
-        let mut in_error_mode = vec![false; received.len()];
-        let last = received.iter().rposition(|heard| !spelled(heard));
-        for (index, heard) in received.iter().enumerate().rev() {
-            run = if spelled(heard) { run + 1 } else { 0 };
-            let at_end = last.is_none_or(|last| index > last);
-            // What comes before any answer can come is unasked: the line was silent before the conversation.
-            let before = index == 0 && run > 0 && early(0);
-            in_error_mode[index] = run > usize::from(ZEROS) || at_end || before;
-        }
-        let same = |index: usize| {
-            index < right || expected.get(index).map(|(_, byte)| *byte) == Some(received[index].1)
-        };
-        let sequence = SEQUENCE.map(Received::good);
-        // Whether a byte differs from a byte on, and whether a whole check sequence comes before the first that does.
-        let (mut differs, mut ended) = (false, false);
-        let mut first = None;
-        for index in (0..received.len()).rev() {
-            if !same(index) {
-                (differs, ended) = (true, false);
-            }
-            let after = received[index..].iter().map(|heard| heard.1);
-            let whole = after.take(sequence.len()).eq(sequence);
-            ended |= whole && (index..index + sequence.len()).all(same);
-            if in_error_mode[index] && differs && !ended && begins(&index) {
-                first = Some(index);
-            }
-        }
-        first
     }
 
     /// The place past the bytes, from an unasked one on, that came before the master's next byte.
@@ -350,12 +212,6 @@ pub(super) fn after_a_race(
     Some((conversation, rest, left))
 }
 
-/// Whether a byte came so much later than in the model that the bench may have left the line silent for longer than it knows.
-fn is_late(expected: &[TimedByte], received: &[TimedByte], index: usize) -> bool {
-    let times = expected.get(index).zip(received.get(index));
-    times.is_some_and(|((due, _), (at, _))| at.since(*due) > HARMLESS)
-}
-
 fn apart(one: Instant, other: Instant) -> Span {
     one.since(other).max(other.since(one))
 }
@@ -363,130 +219,6 @@ fn apart(one: Instant, other: Instant) -> Span {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-
-    /// ND21 9.8, 9.9: bytes that come a little early, as over a socket, among them a byte that is the drive's choice in front of the zeros of a
-    /// check sequence. The sequence comes back whole, so the drives have missed nothing, whatever differs after it.
-    #[test]
-    fn a_check_sequence_ends_what_a_silence_may_have_begun() {
-        let byte = Span::from_micros(286);
-        let size = RingSize::new(3).expect("a size");
-        let way = byte * 4;
-        let ring = |address: u8, last: u8| {
-            let bytes = [address].into_iter().chain(CHECK_SEQUENCE).chain([last]);
-            let timed = bytes.enumerate().map(|(place, value)| {
-                let at = Instant::START + byte * place as u64 + way - Span::from_micros(200);
-                (at, Received::good(value))
-            });
-            timed.collect::<Vec<_>>()
-        };
-        let (expected, received) = (ring(0x60, 0x11), ring(0x00, 0x33));
-        let starts = (0..received.len() as u64).map(|place| Instant::START + byte * place);
-        let starts: Vec<_> = starts.collect();
-        let sent = SentTimes {
-            answered: &starts,
-            all: &starts,
-            way,
-            earliest: EARLIEST_TIME_OUT,
-            complete: true,
-        };
-        let excused = |right: usize| {
-            let excused = sent.excused_from(size, &expected, &received, right, true, false);
-            excused.is_some()
-        };
-        assert!(!excused(received.len() - 1));
-        assert!(excused(0), "a zero that is not expected stands before it");
-    }
-
-    /// ND21 9.9: no drive detects a time-out before 10 ms. A zero in the place of an answer that comes so soon after the byte before it is
-    /// wrong; after a longer silence, or a byte that came late, it may be a drive's that has missed its master.
-    #[test]
-    fn a_zero_behind_a_short_silence_is_not_excused() {
-        let byte = Span::from_micros(286);
-        let size = RingSize::new(3).expect("a size");
-        let way = byte * 4;
-        // The earliest time-out, the bytes in front of the silence, how long it is, and how late each byte comes back.
-        let excused = |earliest: Span, before: u64, silence: Span, (early, late): (Span, Span)| {
-            let start = |place: u64| {
-                let gap = if place < before { Span::ZERO } else { silence };
-                Instant::START + byte * place + gap
-            };
-            let starts: Vec<_> = (0..before + 4).map(start).collect();
-            let heard = |last: u8, (early, late): (Span, Span)| -> Vec<TimedByte> {
-                let places = 0..before + 4;
-                let value = |place: u64| if place < before { SYNCO } else { last };
-                let at = |place: u64| start(place) + way + late - early;
-                let timed = places.map(|place| (at(place), Received::good(value(place))));
-                timed.collect()
-            };
-            let sent = SentTimes {
-                answered: &starts,
-                all: &starts,
-                way,
-                earliest,
-                complete: true,
-            };
-            let (expected, received) = (
-                heard(SYNCO, (Span::ZERO, Span::ZERO)),
-                heard(0, (early, late)),
-            );
-            let right = usize::try_from(before).expect("few");
-            let excused = sent.excused_from(size, &expected, &received, right, true, false);
-            excused.is_some()
-        };
-        let ms = Span::from_millis;
-        let on_time = (ms(0), ms(0));
-        let right = EARLIEST_TIME_OUT;
-        assert!(!excused(right, 250, ms(6), on_time));
-        assert!(!excused(right, 250, ms(8), on_time));
-        assert!(excused(right, 250, ms(9), on_time), "within a millisecond");
-        assert!(excused(right, 20, ms(6), on_time), "silence before them");
-        assert!(
-            excused(right, 250, ms(8), (ms(0), ms(2))),
-            "a late computer"
-        );
-        assert!(
-            excused(right, 250, ms(6), (ms(2), ms(0))),
-            "no times of a line"
-        );
-        // A drive of the model that detects a time-out after 8 ms.
-        assert!(!excused(ms(8), 250, ms(6), on_time));
-        assert!(excused(ms(8), 250, ms(8), on_time));
-    }
-
-    /// No byte comes back before it was sent: the bench was late then, and drives that monitor (ND21 9.9) may have heard a longer silence than it
-    /// notes. Where the model loses bytes, each may answer another one.
-    #[test]
-    fn bytes_before_their_time_show_that_the_bench_was_late() {
-        let size = RingSize::new(3).expect("a size");
-        let (byte, way) = (Span::from_micros(286), Span::from_micros(286 * 4));
-        let starts: Vec<_> = (0..100)
-            .map(|place| Instant::START + byte * (100 + place))
-            .collect();
-        let heard = |early: u64, last: u8| -> Vec<TimedByte> {
-            let values = (0..100).map(|place| if place < 99 { SYNCO } else { last });
-            let came = starts
-                .iter()
-                .map(|start| *start + way - Span::from_millis(early));
-            came.zip(values.map(Received::good)).collect()
-        };
-        let excused = |early: u64, may: bool, complete: bool| {
-            let sent = SentTimes {
-                answered: &starts,
-                all: &starts,
-                way,
-                earliest: EARLIEST_TIME_OUT,
-                complete,
-            };
-            let (expected, received) = (heard(0, SYNCO), heard(early, 0x33));
-            let excused = sent.excused_from(size, &expected, &received, 99, may, false);
-            excused.is_some()
-        };
-        assert!(excused(6, true, true));
-        assert!(!excused(4, true, true));
-        assert!(!excused(6, false, true), "no drive monitors");
-        assert!(!excused(6, true, false));
-    }
 
     /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
     #[test]
@@ -507,8 +239,6 @@ mod tests {
                 answered: &[],
                 all: &[],
                 way: Span::ZERO,
-                earliest: EARLIEST_TIME_OUT,
-                complete: true,
             };
             let answer = TwinBytes {
                 bytes: heard(model),
