@@ -51,22 +51,22 @@ impl CyclicCommand {
     /// The bench of a command.
     pub const fn rig(&self) -> &RigArguments {
         match self {
-            Self::Start(own) => &own.select.rig,
-            Self::Off(own) | Self::QuickStop(own) => &own.rig,
-            Self::Exchange(own) => &own.rig,
-            Self::On(own) => &own.select.rig,
-            Self::Acknowledge(own) => &own.select.rig,
+            Self::Start(arguments) => &arguments.select.rig,
+            Self::Off(arguments) | Self::QuickStop(arguments) => &arguments.rig,
+            Self::Exchange(arguments) => &arguments.rig,
+            Self::On(arguments) => &arguments.select.rig,
+            Self::Acknowledge(arguments) => &arguments.select.rig,
         }
     }
 
     /// The same, to be changed.
     pub const fn rig_mut(&mut self) -> &mut RigArguments {
         match self {
-            Self::Start(own) => &mut own.select.rig,
-            Self::Off(own) | Self::QuickStop(own) => &mut own.rig,
-            Self::Exchange(own) => &mut own.rig,
-            Self::On(own) => &mut own.select.rig,
-            Self::Acknowledge(own) => &mut own.select.rig,
+            Self::Start(arguments) => &mut arguments.select.rig,
+            Self::Off(arguments) | Self::QuickStop(arguments) => &mut arguments.rig,
+            Self::Exchange(arguments) => &mut arguments.rig,
+            Self::On(arguments) => &mut arguments.select.rig,
+            Self::Acknowledge(arguments) => &mut arguments.select.rig,
         }
     }
 }
@@ -184,18 +184,18 @@ pub fn setpoint(text: &str) -> Result<Setpoint, String> {
         let (number, end) = (text.get(..split)?, text.get(split..)?);
         end.eq_ignore_ascii_case(unit).then_some(number.trim())
     };
-    let number = |text: &str| text.parse::<f64>().ok().filter(|own| own.is_finite());
+    let number = |text: &str| text.parse::<f64>().ok().filter(|number| number.is_finite());
     if let Some(number) = ends("%").map(number) {
-        let raw = number.map(|own| (own * f64::from(FULL) / 100.0).round());
+        let raw = number.map(|percent| (percent * f64::from(FULL) / 100.0).round());
         let fits = raw.filter(|raw| (-32_768.0..=32_767.0).contains(raw));
         return fits
             .map(|raw| Setpoint::Raw((raw as i16).cast_unsigned()))
             .ok_or_else(|| wrong("a number from -200% to 199.99% expected"));
     }
     if let Some(number) = ends("Hz").map(number) {
-        let fits = number.filter(|own| own.abs() <= 2_000.0);
+        let fits = number.filter(|hertz| hertz.abs() <= 2_000.0);
         return fits
-            .map(|own| Setpoint::Tenths((own * 10.0).round() as i32))
+            .map(|hertz| Setpoint::Tenths((hertz * 10.0).round() as i32))
             .ok_or_else(|| wrong("a number up to 2000Hz expected"));
     }
     match word(text) {
@@ -214,7 +214,7 @@ pub fn word(text: &str) -> Result<u16, String> {
         .strip_prefix("0x")
         .or_else(|| digits.strip_prefix("0X"))
         .unwrap_or(digits);
-    let plain = digits.len() == 4 && digits.bytes().all(|own| own.is_ascii_hexdigit());
+    let plain = digits.len() == 4 && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
     u16::from_str_radix(digits, 16)
         .ok()
         .filter(|_| plain)

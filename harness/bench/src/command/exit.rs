@@ -95,7 +95,7 @@ Exit codes:
         } else if any(Verdict::Inconclusive)
             || any(Verdict::Flaky)
             || require_all && any(Verdict::Skipped)
-            || verdicts.iter().all(|own| *own == Verdict::Skipped)
+            || verdicts.iter().all(|verdict| *verdict == Verdict::Skipped)
         {
             Self::Incomplete
         } else {
@@ -130,7 +130,7 @@ mod tests {
             let verdicts: Vec<_> = chosen.map(|(_, verdict)| verdict).collect();
             let expected = verdicts
                 .last()
-                .map_or(Exit::NothingSelected, |own| code(*own));
+                .map_or(Exit::NothingSelected, |verdict| code(*verdict));
             assert_eq!(Exit::of(&verdicts, false), expected, "{verdicts:?}");
             let required = match expected {
                 Exit::Passed if verdicts.contains(&Verdict::Skipped) => Exit::Incomplete,

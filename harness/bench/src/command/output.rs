@@ -139,7 +139,7 @@ impl Output {
 
     /// The results collected so far.
     pub fn collected_result(&self) -> &str {
-        self.collected.as_ref().map_or("", |own| &own[0])
+        self.collected.as_ref().map_or("", |streams| &streams[0])
     }
 
     /// Keeps a text where texts are collected; of too long ones their beginning.
@@ -295,7 +295,7 @@ fn break_at(line: &str, room: usize) -> Option<usize> {
 
 /// A table with a heading; each column is as wide as what stands in it.
 pub fn columns(heading: &[&str], rows: &[impl AsRef<[String]>]) -> String {
-    let mut widths: Vec<_> = heading.iter().map(|own| own.len()).collect();
+    let mut widths: Vec<_> = heading.iter().map(|title| title.len()).collect();
     for row in rows {
         for (width, cell) in widths.iter_mut().zip(row.as_ref()) {
             *width = cell.chars().count().max(*width);

@@ -547,20 +547,20 @@ mod tests {
     /// A refusal is shown, and keeps no other drive from its stop; what came of it is read at once.
     #[test]
     fn all_drives_are_stopped_but_one_that_refuses() {
-        let mut own = bench(false);
+        let mut bench = bench(false);
         let orders = vec![
             TopOrder::Stop(None),
             TopOrder::Stop(Some(2)),
             TopOrder::Stop(Some(1)),
             TopOrder::Quit,
         ];
-        let (end, shown) = pumped(&mut own, orders);
+        let (end, shown) = pumped(&mut bench, orders);
         assert!(matches!(end, Ok(Exit::Passed)), "{end:?}");
-        assert_eq!(own.stopped, [0, 2, 3, 4, 5, 2]);
+        assert_eq!(bench.stopped, [0, 2, 3, 4, 5, 2]);
         let events: Vec<_> = shown
             .events
             .iter()
-            .map(|own| (own.what.as_str(), own.is_error, own.count))
+            .map(|event| (event.what.as_str(), event.is_error, event.count))
             .collect();
         let expected = [
             ("drive 1 may not be stopped", true, 2),
@@ -569,7 +569,7 @@ mod tests {
         ];
         assert_eq!(events, expected);
         // Six drives at first; a second has not passed since.
-        assert!(own.read > 6 && own.now < Instant::START + Span::from_millis(1_000));
+        assert!(bench.read > 6 && bench.now < Instant::START + Span::from_millis(1_000));
     }
 
     #[test]

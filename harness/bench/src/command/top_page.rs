@@ -60,10 +60,11 @@ impl TopPage {
 
     /// The events that are new, or have happened again.
     fn notes(&mut self, reading: &Snapshot) -> Vec<String> {
-        let news = reading.events.iter().filter(|own| !self.told.contains(own));
-        let note = |own: &TopEvent| {
-            let times = if own.count == 1 { "time" } else { "times" };
-            format!("{}, {} {times} so far", own.what, own.count)
+        let events = reading.events.iter();
+        let news = events.filter(|event| !self.told.contains(event));
+        let note = |event: &TopEvent| {
+            let times = if event.count == 1 { "time" } else { "times" };
+            format!("{}, {} {times} so far", event.what, event.count)
         };
         let notes = news.map(note).collect();
         self.told.clone_from(&reading.events);

@@ -48,9 +48,9 @@ impl PortRow {
             text: lines.join("\n").into(),
         };
         let read = (self.steps)(&source).or_else(|| (self.setup_mistakes)(port, &source));
-        let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
+        let line = |problem: &Problem| line_number(&source.text, problem.span.start) - 1;
         let problems = read.iter().flat_map(Problems::all);
-        let placed = problems.map(|own| (line(own), own.clone()));
+        let placed = problems.map(|problem| (line(problem), problem.clone()));
         placed.collect()
     }
 }

@@ -53,11 +53,11 @@ impl RigCheck<'_> {
                 "nothing expected here",
             );
         }
-        for (index, own) in self.file.interlock.iter().enumerate() {
+        for (index, interlock) in self.file.interlock.iter().enumerate() {
             let given = [
-                ("register", own.register.is_some()),
-                ("parameter", own.parameter.is_some()),
-                ("bit", own.bit.is_some()),
+                ("register", interlock.register.is_some()),
+                ("parameter", interlock.parameter.is_some()),
+                ("bit", interlock.bit.is_some()),
             ];
             for (key, _) in given.into_iter().filter(|(_, given)| *given) {
                 let path = ["interlock".into(), index.into(), key.into()];
@@ -126,20 +126,20 @@ impl RigCheck<'_> {
         let adapters = port.adapters().into_iter();
         let adapters = adapters.map(|key| (key, row.adapters));
         let more = port.more().into_iter().map(|key| (key, row.keys));
-        let of_port = adapters.chain(more).map(|(key, own)| {
+        let of_port = adapters.chain(more).map(|(key, known)| {
             let path = vec![PORT[0], PORT[1], PathStep::Key(key)];
-            (path, key, own)
+            (path, key, known)
         });
         let of_limits = given.map(|key| {
             let path = vec![PathStep::Key("limits"), PathStep::Key(key)];
             (path, key, row.limits)
         });
         let all: Vec<_> = of_port.chain(of_limits).collect();
-        for (path, key, own) in all {
-            if !own.contains(&key) {
+        for (path, key, known) in all {
+            if !known.contains(&key) {
                 let message = format!("the bus {} has no `{key}`", port.bus.name());
-                let own: Vec<_> = own.iter().map(|key| format!("`{key}`")).collect();
-                let expected = format!("one of {} expected here", own.join(", "));
+                let known: Vec<_> = known.iter().map(|key| format!("`{key}`")).collect();
+                let expected = format!("one of {} expected here", known.join(", "));
                 self.wrong(&path, message, expected);
             }
         }
@@ -214,7 +214,7 @@ impl RigCheck<'_> {
                 self.wrong(&at(key), message, expected);
             }
         }
-        let named = port.channel.as_ref().is_some_and(|own| !name(&own));
+        let named = port.channel.as_ref().is_some_and(|channel| !name(&channel));
         if named && port.socketcand.is_none() {
             let expected = "`channel` only beside `socketcand` expected";
             self.wrong(&at("channel"), "this adapter has one bus", expected);
@@ -302,7 +302,7 @@ impl RigCheck<'_> {
             }
             numbers.push(number);
             for identifier in identifiers {
-                if let Some((_, other)) = seen.iter().find(|(own, _)| *own == identifier) {
+                if let Some((_, other)) = seen.iter().find(|(other, _)| *other == identifier) {
                     let message = format!(
                         "identifier {identifier:03X} is used twice, first by the drive in place {}",
                         other + 1
@@ -321,16 +321,18 @@ impl RigCheck<'_> {
         let file = self.file;
         let listed = port.drives.iter().enumerate();
         let listed: Vec<u8> = listed.map(|(at, node)| (row.drive)(at, *node).0).collect();
-        for (index, own) in file.interlock.iter().enumerate() {
+        for (index, interlock) in file.interlock.iter().enumerate() {
             let entry = [PathStep::Key("interlock"), PathStep::Index(index)];
             let at = |key| [entry[0], entry[1], PathStep::Key(key)];
             let (key, read) = row.interlock;
+            let register = interlock.register.is_some();
+            let parameter = interlock.parameter.is_some();
             let foreign = [
-                ("ring", own.ring != 1),
-                ("cell", own.cell.is_some()),
-                ("input", own.input.is_some()),
-                ("register", own.register.is_some() && key != "register"),
-                ("parameter", own.parameter.is_some() && key != "parameter"),
+                ("ring", interlock.ring != 1),
+                ("cell", interlock.cell.is_some()),
+                ("input", interlock.input.is_some()),
+                ("register", register && key != "register"),
+                ("parameter", parameter && key != "parameter"),
             ];
             let foreign: Vec<_> = foreign.iter().filter(|(_, given)| *given).collect();
             for (other, _) in &foreign {
@@ -341,22 +343,20 @@ impl RigCheck<'_> {
                     format!("`{key}` expected in its place"),
                 );
             }
-            if !listed.contains(&own.drive) {
-                let message = format!("the port has no drive {}", own.drive);
+            if !listed.contains(&interlock.drive) {
+                let message = format!("the port has no drive {}", interlock.drive);
                 self.wrong(&at("drive"), message, "a drive of `drives` expected here");
             }
             if port.listen_only {
                 let message = "nothing is sent with `listen_only = true`, so this cannot be read";
                 self.wrong(&entry, message, "no such table expected here");
             }
-            let named = [("register", &own.register), ("parameter", &own.parameter)];
-            let named = named
-                .iter()
-                .any(|(own, name)| *own == key && name.is_some());
+            let named = [("register", register), ("parameter", parameter)];
+            let named = named.contains(&(key, true));
             if !named && foreign.is_empty() {
                 let message = "it is not clear what must hold";
                 self.wrong(&entry, message, format!("`{key}` expected in here"));
-            } else if named && let Err((key, message, expected)) = read(own) {
+            } else if named && let Err((key, message, expected)) = read(interlock) {
                 self.wrong(&at(key), message, expected);
             }
         }

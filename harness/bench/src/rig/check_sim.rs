@@ -77,12 +77,12 @@ impl RigCheck<'_> {
         }
         let text = lines.join("\n");
         let place = |span: TextSpan| line(line_number(&text, span.start) - 1);
-        let own = Source {
+        let lines = Source {
             name: source.name.clone(),
             text: text.as_str().into(),
         };
         let profile = profile.map(|profile| profile.lines.as_slice());
-        for (span, problem) in (self.buses.rings.mistakes)(self.file, profile, &own) {
+        for (span, problem) in (self.buses.rings.mistakes)(self.file, profile, &lines) {
             match span {
                 Some(span) => self.add(&place(span), &problem),
                 None => self.add(&["rig".into(), "profile".into()], &problem),

@@ -27,8 +27,8 @@ impl Interlock {
     ) -> Result<PortCondition<B>, Mistake> {
         match (&self.bit, self.level, &self.min, &self.max) {
             (Some(name), Some(level), None, None) => {
-                let names: Vec<_> = bits.iter().map(|(_, own)| *own).collect();
-                let found = bits.iter().find(|(_, own)| own == name);
+                let names: Vec<_> = bits.iter().map(|(_, bit)| *bit).collect();
+                let found = bits.iter().find(|(_, bit)| bit == name);
                 let (number, _) = found.ok_or_else(|| {
                     let expected = match names.is_empty() {
                         true => "it has no named bits: `min` or `max` expected in its place".into(),
@@ -61,7 +61,7 @@ impl Interlock {
     /// The interlock in a sentence, with the name of its register or parameter.
     pub fn words(&self, name: &str) -> String {
         let message = self.message.as_ref();
-        let message = message.map_or_else(String::new, |own| format!(" ({own})"));
+        let message = message.map_or_else(String::new, |message| format!(" ({message})"));
         format!("interlock on {name} of drive {}{message}", self.drive)
     }
 

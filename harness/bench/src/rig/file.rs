@@ -560,7 +560,7 @@ impl Deviation {
     pub fn explains(&self, rule: &str, ring: usize, drive: Option<u8>) -> bool {
         self.rule == rule
             && usize::from(self.ring) == ring + 1
-            && (self.drives.is_empty() || drive.is_none_or(|own| self.drives.contains(&own)))
+            && (self.drives.is_empty() || drive.is_none_or(|drive| self.drives.contains(&drive)))
     }
 }
 
@@ -601,12 +601,12 @@ mod tests {
             received: None,
             reason: "it has always done so".to_owned(),
         };
-        let own = known(&[0, 3]);
-        assert!(own.explains("manual 10.2", 0, Some(3)));
-        assert!(own.explains("manual 10.2", 0, None));
-        assert!(!own.explains("manual 10.2", 0, Some(2)));
-        assert!(!own.explains("manual 10.2", 1, Some(3)));
-        assert!(!own.explains("manual 10.3", 0, Some(3)));
+        let deviation = known(&[0, 3]);
+        assert!(deviation.explains("manual 10.2", 0, Some(3)));
+        assert!(deviation.explains("manual 10.2", 0, None));
+        assert!(!deviation.explains("manual 10.2", 0, Some(2)));
+        assert!(!deviation.explains("manual 10.2", 1, Some(3)));
+        assert!(!deviation.explains("manual 10.3", 0, Some(3)));
         assert!(known(&[]).explains("manual 10.2", 0, Some(2)));
     }
 }

@@ -100,7 +100,7 @@ pub fn find(name: &str, folder: &Path, buses: &'static RigBuses) -> Result<Rig, 
 
 /// The name of the simulated rig that was probably meant, given what stands behind `sim:`: `nordca:2` means `sim:nordac:2`.
 fn meant_bus(text: &str) -> Option<String> {
-    let (word, number) = text.split_once(':').map_or((text, ""), |own| own);
+    let (word, number) = text.split_once(':').unwrap_or((text, ""));
     let names = PortBus::ALL.map(PortBus::name);
     let bus = nearest(word, &names)?;
     let colon = if number.is_empty() { "" } else { ":" };
@@ -203,9 +203,10 @@ fn rig_name(path: &Path) -> Option<String> {
 #[must_use]
 pub(crate) fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
     let (bus, number) = text.split_once(':').unwrap_or((text, "1"));
-    let bus = PortBus::ALL.into_iter().find(|own| own.name() == bus)?;
+    let bus = PortBus::ALL.into_iter().find(|known| known.name() == bus)?;
     let most = bus.most_drives();
-    let drives = number.parse().ok().filter(|own| (1..=most).contains(own));
+    let drives = number.parse().ok();
+    let drives = drives.filter(|drives| (1..=most).contains(drives));
     let wrong = || format!("`{number}` is not a number of drives: 1 to {most} expected");
     Some((bus, drives.ok_or_else(wrong)))
 }

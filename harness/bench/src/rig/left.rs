@@ -36,7 +36,7 @@ impl NotPutBack {
         let folder = state::folder().ok().filter(|_| !rig.is_simulated());
         Self {
             changed: Arc::default(),
-            file: folder.map(|own| own.join(format!("{}.left", rig.id()))),
+            file: folder.map(|folder| folder.join(format!("{}.left", rig.id()))),
             origin: rig.origin.clone(),
         }
     }
@@ -61,7 +61,7 @@ impl NotPutBack {
     /// All that was foretold is put back but for this.
     pub fn keep(&self, notes: &[String]) {
         let mut changed = self.changed();
-        let fresh = notes.iter().filter(|own| !changed.kept.contains(own));
+        let fresh = notes.iter().filter(|note| !changed.kept.contains(note));
         let fresh: Vec<_> = fresh.cloned().collect();
         changed.kept.extend(fresh);
         drop(changed);
@@ -74,7 +74,7 @@ impl NotPutBack {
         let all = self.all().join("\n");
         let _kept = match all.is_empty() {
             true => std::fs::remove_file(file),
-            false => state::create(file).and_then(|mut own| own.write_all(all.as_bytes())),
+            false => state::create(file).and_then(|mut file| file.write_all(all.as_bytes())),
         };
     }
 

@@ -313,7 +313,7 @@ pub enum PortLockError {
         how: &'static str,
     },
     /// Another process has its interface.
-    #[error("the interface is in use by another program{}", .0.iter().map(|own| format!(": {own}")).collect::<String>())]
+    #[error("the interface is in use by another program{}", .0.iter().map(|program| format!(": {program}")).collect::<String>())]
     Other(Option<OtherProgram>),
     /// The system refused.
     #[error("failed to lock the port: {0}")]

@@ -121,8 +121,9 @@ impl Attempt {
     /// Whether it accuses no drive and speaks for none, for a reason that another attempt need not have: the drives were not ready, or the
     /// computer was late.
     fn showed_nothing(&self) -> bool {
-        let own = &self.outcome;
-        own.verdict == Verdict::Inconclusive && (own.unready.is_some() || own.shows_nothing)
+        let outcome = &self.outcome;
+        outcome.verdict == Verdict::Inconclusive
+            && (outcome.unready.is_some() || outcome.shows_nothing)
     }
 }
 
@@ -176,7 +177,7 @@ impl PlayedScenario {
             let why = why.filter(|why| !outcome.remarks.contains(why));
             outcome.remarks.extend(why);
             let right = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
-            let differed = |own: &Attempt| own.failed() && !own.showed_nothing();
+            let differed = |attempt: &Attempt| attempt.failed() && !attempt.showed_nothing();
             if right && attempts.iter().any(differed) {
                 outcome.verdict = Verdict::Flaky;
             }
@@ -193,13 +194,14 @@ impl PlayedScenario {
     #[must_use]
     pub fn shows_an_ill_rig(&self) -> bool {
         let last = self.attempts.last();
-        self.outcome.verdict == Verdict::RigError && last.is_none_or(|own| own.master_is_right)
+        self.outcome.verdict == Verdict::RigError
+            && last.is_none_or(|attempt| attempt.master_is_right)
     }
 
     /// The last attempt that was played; the last one at all where none was.
     #[must_use]
     pub fn last_played(&self) -> Option<&Attempt> {
-        let played = self.attempts.iter().rfind(|own| own.was_played());
+        let played = self.attempts.iter().rfind(|attempt| attempt.was_played());
         played.or(self.attempts.last())
     }
 }
@@ -264,8 +266,8 @@ impl Again {
             _ => {
                 let (late, failed): (Vec<_>, Vec<_>) = attempts
                     .iter()
-                    .filter(|own| own.failed())
-                    .partition(|own| own.outcome.shows_nothing);
+                    .filter(|attempt| attempt.failed())
+                    .partition(|attempt| attempt.outcome.shows_nothing);
                 failed.len() < most && late.len() < most.max(MOST_LATE)
             }
         }
@@ -384,9 +386,9 @@ mod tests {
     #[test]
     fn a_late_computer_takes_no_attempt_from_what_fails() {
         let late = || {
-            let mut own = attempt(Inconclusive, "");
-            own.outcome.shows_nothing = true;
-            own
+            let mut late = attempt(Inconclusive, "");
+            late.outcome.shows_nothing = true;
+            late
         };
         let mut again = Again::new(TOLERANCE);
         let mut more = |played: &[Attempt], most| again.after(played, most);

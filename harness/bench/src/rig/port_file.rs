@@ -187,7 +187,7 @@ impl Port {
 /// Whether a device is the end of a pseudo terminal, behind links such as those that `sim --pty` makes.
 fn is_pseudo_terminal(path: &str) -> bool {
     let real = std::fs::canonicalize(path);
-    real.is_ok_and(|own| own.starts_with("/dev/pts"))
+    real.is_ok_and(|path| path.starts_with("/dev/pts"))
 }
 
 /// A drive on a bus: on CAN its number or its identifiers, on a line of octets its address.

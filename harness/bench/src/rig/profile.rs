@@ -105,7 +105,7 @@ impl<S: ProfileSetup + DeserializeOwned> Profile<S> {
     pub fn header(&self) -> S {
         let mut all = S::default();
         let settled = self.property.values();
-        settled.for_each(|own| all.add(&own.setup));
+        settled.for_each(|property| all.add(&property.setup));
         all
     }
 }

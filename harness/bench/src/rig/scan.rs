@@ -109,7 +109,7 @@ pub fn scan(root: &Path) -> Vec<FoundPort> {
         .into_iter()
         .flatten();
     // The kernel writes its messages to a console.
-    let is_console = |name: &str| consoles.split_whitespace().any(|own| own == name);
+    let is_console = |name: &str| consoles.split_whitespace().any(|console| console == name);
     let mut ports: Vec<_> = entries
         .take(MAX_PORTS)
         .filter_map(Result::ok)

@@ -419,9 +419,9 @@ impl<D: RigDrives> Drop for RigSession<D> {
 
 /// The header lines that a rig's file has for its drives: those of its profile, and behind them those of `[sim]`.
 pub(crate) fn setup_lines(rig: &Rig) -> Vec<String> {
-    let profile = rig.profile.iter().flat_map(|own| &own.lines);
-    let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
-    profile.chain(own).cloned().collect()
+    let profile = rig.profile.iter().flat_map(|profile| &profile.lines);
+    let simulated = rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    profile.chain(simulated).cloned().collect()
 }
 
 /// The same as a text.

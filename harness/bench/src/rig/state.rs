@@ -136,9 +136,9 @@ pub fn folder() -> io::Result<PathBuf> {
         }
     }
     let uid = rustix::process::getuid().as_raw();
-    let own = named("XDG_RUNTIME_DIR").map(|folder| folder.join(SHARED[1]));
+    let of_session = named("XDG_RUNTIME_DIR").map(|folder| folder.join(SHARED[1]));
     make(
-        own.unwrap_or_else(|| std::env::temp_dir().join(format!("drivebench-{uid}"))),
+        of_session.unwrap_or_else(|| std::env::temp_dir().join(format!("drivebench-{uid}"))),
         0o700,
     )
 }

@@ -128,9 +128,9 @@ pub(super) fn watch_over(
     let cut = safe_state.order.contains(&SafeStep::PowerOff);
     let rig = rig.clone();
     let stop = move || {
-        let said = ports.iter().enumerate().flat_map(|(port, own)| {
-            let said = words(port).into_iter().map(|words| own.say(&words));
-            said.filter_map(|own| Some(own.err()?.to_string()))
+        let said = ports.iter().enumerate().flat_map(|(port, last_words)| {
+            let said = words(port).into_iter().map(|words| last_words.say(&words));
+            said.filter_map(|sent| Some(sent.err()?.to_string()))
                 .collect::<Vec<_>>()
         });
         let mut failed: Vec<_> = said.collect();

@@ -57,7 +57,7 @@ fn settings<B: LineRig>(
         spices: scope
             .spices
             .iter()
-            .map(|own| own.name().to_owned())
+            .map(|spice| spice.name().to_owned())
             .collect(),
     }
 }
@@ -125,8 +125,8 @@ fn run<B: LineRig>(
 /// What conversations on a rig do not have, with the limit that would permit it; nothing where they have everything.
 fn left_out<B: LineRig>(rig: &Rig, allow_motion: bool) -> String {
     let mut left: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for (name, own) in B::Spice::ALL {
-        if let Some(why) = B::lacks(rig, allow_motion, *own) {
+    for (name, spice) in B::Spice::ALL {
+        if let Some(why) = B::lacks(rig, allow_motion, *spice) {
             left.entry(why).or_default().push(name);
         }
     }
@@ -144,7 +144,7 @@ fn left_out<B: LineRig>(rig: &Rig, allow_motion: bool) -> String {
 fn simulated<B: LineRig>(rig: &Rig) -> LineScope<B> {
     LineScope {
         drives: B::stations(rig, None),
-        spices: B::Spice::ALL.iter().map(|(_, own)| *own).collect(),
+        spices: B::Spice::ALL.iter().map(|(_, spice)| *spice).collect(),
     }
 }
 
@@ -166,11 +166,11 @@ fn on_adapter<B: LineRig>(
             return Ok(exit_of(&error));
         }
     };
-    let all = B::Spice::ALL.iter().map(|(_, own)| *own);
+    let all = B::Spice::ALL.iter().map(|(_, spice)| *spice);
     let scope = LineScope::<B> {
         drives: B::stations(rig, Some(&session)),
         spices: all
-            .filter(|own| B::lacks(rig, options.allow_motion, *own).is_none())
+            .filter(|spice| B::lacks(rig, options.allow_motion, *spice).is_none())
             .collect(),
     };
     let mut setup = LineSetup::of_rig::<B>(rig, &scope.drives, Vec::new());
@@ -211,7 +211,8 @@ fn refused<B: LineRig>(rig: &Rig, arguments: &FuzzRunArguments) -> Option<String
                 .to_owned(),
         );
     }
-    let second = arguments.deviates.iter().any(|own| own.ring != 0);
+    let mut planted = arguments.deviates.iter();
+    let second = planted.any(|drive| drive.ring != 0);
     second.then(|| {
         format!(
             "a deviation of {drives} is planted as NUMBER=NAME; `drivebench deviations --bus {bus}` lists the names"
@@ -243,7 +244,8 @@ fn shrink<B: LineRig>(
         (false, None) => {
             let most = arguments.runs.unwrap_or(RUNS);
             let drives = finding.setup.under_test::<B>();
-            let small = drives.and_then(|own| smaller(&finding, &mut OnLine::<B>::new(own), most));
+            let target = drives.map(OnLine::<B>::new);
+            let small = target.and_then(|mut target| smaller(&finding, &mut target, most));
             told(small, output)
         }
         (false, Some(_)) => {
@@ -300,7 +302,7 @@ fn is_shown<B: LineRig>(
         }
         target.begin();
         let found = target.attempt(&finding.case, &rehearsal)?.difference;
-        if found.is_some_and(|own| own.is_like(&finding.difference)) {
+        if found.is_some_and(|difference| difference.is_like(&finding.difference)) {
             return Ok(true);
         }
     }

@@ -48,7 +48,8 @@ fn verify<C: FuzzCase>(
     // What `shrink` makes of a finding comes behind the sums.
     let is_small = |wrong: &str| {
         let file = wrong.strip_suffix(" was added");
-        matches!(file.and_then(|own| strange.get(own)), Some(Strange::Small))
+        let kind = file.and_then(|file| strange.get(file));
+        matches!(kind, Some(Strange::Small))
     };
     let mut files = files.unwrap_or_default();
     files.retain(|wrong| !is_small(wrong));
@@ -60,8 +61,8 @@ fn verify<C: FuzzCase>(
         wrong += 1;
         output.result(&format!("{RECORD}: {why}\n"))?;
     }
-    for (file, own) in strange {
-        let text = match own {
+    for (file, kind) in strange {
+        let text = match kind {
             Strange::Added => {
                 wrong += 1;
                 format!("{file} is not a file of the run\n")
@@ -164,14 +165,14 @@ fn strange<C: FuzzCase>(folder: &Path, kept: &KeptRun<C>) -> BTreeMap<String, St
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let names = names.filter(|name| ![RECORD, SUMS, SIGNATURE].contains(&name.as_str()));
     let judged = names.filter_map(|name| {
-        let own = match finding_of(&name) {
+        let kind = match finding_of(&name) {
             Some((number, small)) if numbers.contains(&number) => {
                 small.then_some(Strange::Small)?
             }
             Some((number, _)) if number >= kept.progress.cases => Strange::Unsettled,
             _ => Strange::Added,
         };
-        Some((name, own))
+        Some((name, kind))
     });
     judged.collect()
 }
@@ -180,7 +181,7 @@ fn strange<C: FuzzCase>(folder: &Path, kept: &KeptRun<C>) -> BTreeMap<String, St
 fn finding_of(name: &str) -> Option<(u64, bool)> {
     let stem = [".json", ".scn"]
         .iter()
-        .find_map(|own| name.strip_suffix(own))?;
+        .find_map(|suffix| name.strip_suffix(suffix))?;
     let plain = stem.strip_suffix("-small").unwrap_or(stem);
     let number = plain.strip_prefix("finding-")?.parse().ok()?;
     (plain == file_of(number)).then_some((number, plain != stem))
@@ -206,7 +207,7 @@ fn again<C: FuzzCase>(
         let why = "it is for other drives than the run has".to_owned();
         return Ok((finding, JudgedAgain::Differs(why)));
     }
-    let of = |own: &Finding<C>| (own.rig.clone(), own.setup.clone(), own.ports, own.seed);
+    let of = |of: &Finding<C>| (of.rig.clone(), of.setup.clone(), of.ports, of.seed);
     let same = (
         about.rig.clone(),
         about.setup.clone(),

@@ -43,7 +43,7 @@ impl RecordedBench {
             true => (simulated, Span::ZERO),
             false => (ON_PORT.as_slice(), tolerance),
         };
-        let has = |own: &&Capability| match own {
+        let has = |capability: &&Capability| match capability {
             Capability::Motion => motion,
             Capability::Eeprom => eeprom,
             // No record shows them.

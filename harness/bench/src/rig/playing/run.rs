@@ -54,7 +54,7 @@ pub trait PortPlayer: Sized {
     fn read(source: &Source) -> Result<Self::Own, Box<Problems>>;
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
-    fn not_begun(&self, own: &Self::Own) -> Option<Skip>;
+    fn not_begun(&self, scenario: &Self::Own) -> Option<Skip>;
 
     /// Whether a scenario does something to the drives beside the bus.
     fn disturbs(_own: &Self::Own) -> bool {
@@ -76,10 +76,14 @@ pub trait PortPlayer: Sized {
     fn doubt(&mut self) {}
 
     /// One attempt over a link, with what was received before the scenario, in words.
-    fn attempt(&mut self, own: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
+    fn attempt(&mut self, scenario: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
 
     /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
-    fn set_back(&mut self, own: &Self::Own, session: &mut RigSession<Self::Drives>) -> Vec<String>;
+    fn set_back(
+        &mut self,
+        scenario: &Self::Own,
+        session: &mut RigSession<Self::Drives>,
+    ) -> Vec<String>;
 
     /// The scenarios that a qualification plays behind the selected ones.
     fn conversations(rig: &Rig) -> Vec<Source>;
@@ -145,9 +149,9 @@ impl<P: PortPlayer> PortRun<P> {
     }
 
     /// Sets back what a scenario has changed.
-    fn set_back(&mut self, own: &P::Own) {
+    fn set_back(&mut self, scenario: &P::Own) {
         let player = &mut self.player;
-        let set_back = |session: &mut _| player.set_back(own, session);
+        let set_back = |session: &mut _| player.set_back(scenario, session);
         let notes = self.session.without_deadline(set_back);
         self.session.left().keep(&notes);
         self.notes.extend(notes);
@@ -158,15 +162,15 @@ impl<P: PortPlayer> PortRun<P> {
     /// # Errors
     /// The safe state is not confirmed.
     pub fn clear_up(&mut self) -> Result<(), Safe> {
-        let Some(own) = self.unfinished.take() else {
+        let Some(scenario) = self.unfinished.take() else {
             return Ok(());
         };
         let safe = self.session.make_safe();
         if !safe.confirmed {
-            self.unfinished = Some(own);
+            self.unfinished = Some(scenario);
             return Err(safe);
         }
-        self.set_back(&own);
+        self.set_back(&scenario);
         Ok(())
     }
 
@@ -190,12 +194,12 @@ impl<P: PortPlayer> PortRun<P> {
         }
     }
 
-    fn attempt(&mut self, own: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
+    fn attempt(&mut self, scenario: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
         let anew = P::ANEW && self.session.rig().is_simulated();
         if anew {
             self.restart();
         }
-        self.player.wait(own, self.session.link());
+        self.player.wait(scenario, self.session.link());
         self.session.link().reset_after_denial();
         self.session.look_at_interlocks();
         // A look takes drives where no scenario expects them that were just switched on.
@@ -205,7 +209,7 @@ impl<P: PortPlayer> PortRun<P> {
         }
         let _before = self.session.take_doubtful();
         let mut recording = Recording::new(self.session.link(), sink);
-        let (mut outcome, before) = self.player.attempt(own, &mut recording);
+        let (mut outcome, before) = self.player.attempt(scenario, &mut recording);
         let traces = vec![recording.trace(0)];
         // A link that is lost may be back at the end of the run.
         let tripped = matches!(
@@ -215,7 +219,7 @@ impl<P: PortPlayer> PortRun<P> {
         let played = outcome.verdict != Verdict::Skipped && !anew;
         if played && tripped {
             // The drives go to their safe state at the end of the run, and what the scenario has changed is set back then.
-            self.unfinished = Some(Arc::clone(own));
+            self.unfinished = Some(Arc::clone(scenario));
         } else if played {
             let mut safe = self.session.make_safe();
             if !safe.confirmed && self.session.link().trouble().is_none() {
@@ -223,9 +227,9 @@ impl<P: PortPlayer> PortRun<P> {
                 safe = self.session.make_safe();
             }
             match safe.confirmed {
-                true => self.set_back(own),
+                true => self.set_back(scenario),
                 false => {
-                    self.unfinished = Some(Arc::clone(own));
+                    self.unfinished = Some(Arc::clone(scenario));
                     self.over = Some(format!("after the scenario: {safe}"));
                 }
             }
@@ -248,7 +252,7 @@ impl<P: PortPlayer> PortRun<P> {
             Verdict::Skipped => false,
             _ => P::deviates(self.session.rig()),
         };
-        if anew && may_disobey && !P::disturbs(own) {
+        if anew && may_disobey && !P::disturbs(scenario) {
             let safe = self.session.make_safe();
             self.not_safe = self.not_safe.take().or((!safe.confirmed).then_some(safe));
         }
@@ -270,11 +274,11 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
         source: &Source,
         mut keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError> {
-        let own = match read::<P>(source) {
-            Ok(own) => Arc::new(own),
+        let scenario = match read::<P>(source) {
+            Ok(scenario) => Arc::new(scenario),
             Err(skip) => return Ok(PlayedScenario::skipped(skip)),
         };
-        if let Some(skip) = self.player.not_begun(&own) {
+        if let Some(skip) = self.player.not_begun(&scenario) {
             return Ok(PlayedScenario::skipped(skip.on_port()));
         }
         let real = !self.session.rig().is_simulated();
@@ -286,11 +290,11 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
             let attempt = match &mut keeper {
                 Some(keeper) => {
                     keeper.begins(number);
-                    let attempt = self.attempt(&own, &mut **keeper);
+                    let attempt = self.attempt(&scenario, &mut **keeper);
                     keeper.ends(number, &attempt);
                     attempt
                 }
-                None => self.attempt(&own, &mut forgotten),
+                None => self.attempt(&scenario, &mut forgotten),
             };
             attempts.push(attempt);
             let more = self.again.after(&attempts, most);
@@ -379,7 +383,7 @@ impl<P: PortPlayer> PortJudge<P> {
     }
 
     /// Plays an attempt on the simulated rig again, behind those before it.
-    fn again(&mut self, own: &Arc<P::Own>) -> Result<RepeatedVerdict, String> {
+    fn again(&mut self, scenario: &Arc<P::Own>) -> Result<RepeatedVerdict, String> {
         let mut run = match self.run.take() {
             Some(run) => run,
             None => {
@@ -397,7 +401,7 @@ impl<P: PortPlayer> PortJudge<P> {
             }
         };
         let mut events: Vec<LinkEvent> = Vec::new();
-        let attempt = run.attempt(own, &mut events);
+        let attempt = run.attempt(scenario, &mut events);
         let trouble = run.trouble().is_some();
         self.run = Some(run);
         let traces = attempt.traces.clone();
@@ -415,15 +419,15 @@ impl<P: PortPlayer> PortJudge<P> {
 
     fn repeated(
         &mut self,
-        own: &Arc<P::Own>,
+        scenario: &Arc<P::Own>,
         events: &[LinkEvent],
     ) -> Result<RepeatedVerdict, String> {
         if self.rig.is_simulated() {
-            return self.again(own);
+            return self.again(scenario);
         }
         let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
         let mut replay = self.player.replay(events, tolerance);
-        let (outcome, before) = self.player.attempt(own, &mut replay);
+        let (outcome, before) = self.player.attempt(scenario, &mut replay);
         Ok(RepeatedVerdict {
             attempt: Attempt {
                 opening: Some(before),
@@ -440,9 +444,9 @@ impl<P: PortPlayer> PortJudge<P> {
 impl<P: PortPlayer> RecordJudge for PortJudge<P> {
     fn adopt(&mut self, capabilities: &[String]) -> RecordedBench {
         let [moving, still] = [true, false].map(|motion| P::segment(&self.rig, motion));
-        let named = |own: &RecordedBench| {
-            let own = own.capabilities.iter().map(|own| own.name());
-            own.eq(capabilities.iter().map(String::as_str))
+        let named = |bench: &RecordedBench| {
+            let names = bench.capabilities.iter().map(|ability| ability.name());
+            names.eq(capabilities.iter().map(String::as_str))
         };
         let segment = match named(&still) {
             true => (still, false),
@@ -456,7 +460,7 @@ impl<P: PortPlayer> RecordJudge for PortJudge<P> {
     fn not_begun(&self, source: &Source, _remarks: &[String]) -> Option<Outcome> {
         let skip = match read::<P>(source) {
             Err(skip) => Some(skip),
-            Ok(own) => self.player.not_begun(&own),
+            Ok(scenario) => self.player.not_begun(&scenario),
         };
         skip.map(Outcome::skipped)
     }
@@ -496,8 +500,8 @@ impl<P: PortPlayer> RecordJudge for PortJudge<P> {
         source: &Source,
         recorded: RecordedAttempt<'_>,
     ) -> Result<RepeatedVerdict, String> {
-        let own = P::read(source).map_err(|problems| problems.to_string())?;
-        let mut repeated = self.repeated(&Arc::new(own), recorded.events)?;
+        let scenario = P::read(source).map_err(|problems| problems.to_string())?;
+        let mut repeated = self.repeated(&Arc::new(scenario), recorded.events)?;
         repeated.attempt.unplaced = recorded.unplaced;
         repeated.attempt.outcome.unplaced(recorded.unplaced);
         if recorded.unplaced > 0 {
