@@ -52,9 +52,9 @@ impl PairCounts {
     }
 
     fn and(&mut self, other: &Self) {
-        let own = self.counts.iter_mut().flatten();
-        for (own, other) in own.zip(other.counts.iter().flatten()) {
-            *own += other;
+        let counts = self.counts.iter_mut().flatten();
+        for (counts, other) in counts.zip(other.counts.iter().flatten()) {
+            *counts += other;
         }
         self.closer += other.closer;
     }

@@ -29,7 +29,8 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
     let mut found = every(session.link(), rings);
     // What drives spelled out before the rig was opened.
     for (ring, spelled) in before.into_iter().flat_map(|health| health.reported) {
-        if let Some(recovery) = found.get_mut(ring).filter(|own| own.fault().is_none()) {
+        let recovery = found.get_mut(ring);
+        if let Some(recovery) = recovery.filter(|recovery| recovery.fault().is_none()) {
             recovery.before = Some(spelled);
         }
     }

@@ -102,7 +102,7 @@ impl Sighting {
         let index = *answered.get((found.byte - 1).checked_sub(unasked)?)?;
         let came = |at: usize| {
             let place = (found.byte - 1 + at).checked_sub(index)?;
-            received.get(place).map(|own| own.2.byte)
+            received.get(place).map(|(_, _, answer)| answer.byte)
         };
         let (meant, section, end) = sent.blame(index, drives, found, &came);
         let word_of_bytes = sent.sent_bytes().is_word_of_bytes(index);
@@ -183,8 +183,9 @@ pub(crate) fn exchange<E>(
     mut sightings: Vec<(String, Sighting)>,
     ask: Ask<'_, E>,
 ) -> Result<Vec<Trial>, E> {
-    sightings.retain(|(_, own)| own.meant != Meant::Nobody);
-    sightings.sort_by_key(|(_, own)| (matches!(own.meant, Meant::Behind(_)), own.count));
+    sightings.retain(|(_, sighting)| sighting.meant != Meant::Nobody);
+    sightings
+        .sort_by_key(|(_, sighting)| (matches!(sighting.meant, Meant::Behind(_)), sighting.count));
     let mut trials: Vec<Trial> = Vec::new();
     let mut tried = BTreeSet::new();
     for (name, sighting) in &sightings {
@@ -248,9 +249,9 @@ pub(crate) fn culprit(
     trials: &[Trial],
     pinned: &[Pinned],
 ) -> Option<Culprit> {
-    let mut shown = pinned.iter().filter(|own| own.names_the_drive);
+    let mut shown = pinned.iter().filter(|pinned| pinned.names_the_drive);
     if let Some(first) = shown.next() {
-        let same = shown.all(|own| own.drive == first.drive);
+        let same = shown.all(|pinned| pinned.drive == first.drive);
         return same.then_some(Culprit {
             drive: first.drive,
             perhaps_of_all: false,
@@ -262,11 +263,11 @@ pub(crate) fn culprit(
             perhaps_of_all: false,
         });
     }
-    let own = |meant: &Meant| match meant {
+    let owner = |meant: &Meant| match meant {
         Meant::Own(drive) => Some(*drive),
         _ => None,
     };
-    let owners: BTreeSet<u8> = seen.iter().filter_map(own).collect();
+    let owners: BTreeSet<u8> = seen.iter().filter_map(owner).collect();
     if let Some(first) = owners.first().copied() {
         let mut own_trials = trials
             .iter()
@@ -306,14 +307,14 @@ pub(crate) fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culpr
         return (None, proven(named.to_vec()));
     };
     let may_be =
-        |own: &&Named| matches!(&own.whose, Whose::OneOf(all) if all.contains(&blamed.drive));
+        |named: &&Named| matches!(&named.whose, Whose::OneOf(all) if all.contains(&blamed.drive));
     let agreed: Vec<_> = named.iter().filter(may_be).cloned().collect();
     if agreed.is_empty() && !named.is_empty() {
         return (None, proven(named.to_vec()));
     }
-    let of_it = agreed.into_iter().map(|own| Named {
+    let of_it = agreed.into_iter().map(|named| Named {
         whose: Whose::OneOf(vec![blamed.drive]),
-        ..own
+        ..named
     });
     (culprit, of_it.collect())
 }
@@ -321,10 +322,10 @@ pub(crate) fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culpr
 /// Behind errors of which drives a ring differed, where they were provoked in one drive after the other; `None` where that was not done for
 /// every drive, or something else differed.
 fn errors_of(drives: u8, trial: &Trial) -> Option<BTreeSet<u8>> {
-    let Meant::Behind(own) = trial.meant else {
+    let Meant::Behind(first) = trial.meant else {
         return None;
     };
-    let mut wrong = BTreeSet::from([own]);
+    let mut wrong = BTreeSet::from([first]);
     for (_, found) in &trial.steps {
         match found {
             None => {}
@@ -379,7 +380,7 @@ impl Sent {
             Role::Command { .. } | Role::Data { .. } | Role::Check { .. }
         );
         // A 00 of the master's is an error by itself, and is answered so by a drive that has found none before.
-        let next = self.bytes.get(index + 1).map_or(0, |own| own.0);
+        let next = self.bytes.get(index + 1).map_or(0, |(byte, _)| *byte);
         let tells = next != 0 || came(index) == Some(self.bytes[index].0);
         // Zeros of an error go on to the checking byte at least, which is none of data (9.6).
         let is_check = |at: &usize| matches!(self.roles.get(*at), Some(Role::Check { .. }));
@@ -424,7 +425,7 @@ impl Sent {
             .iter()
             .skip(start)
             .all(|(_, whole)| *whole);
-        let idle = |own: &(u8, bool)| own.0 == SYNCO;
+        let idle = |(byte, _): &(u8, bool)| *byte == SYNCO;
         let meant = match index {
             _ if !whole || index < first => Meant::Nobody,
             _ if index < end => Meant::Own(drive),
@@ -470,7 +471,7 @@ mod tests {
     }
 
     fn blamed(seen: &[Meant], trials: &[Trial]) -> Option<u8> {
-        culprit(3, seen, trials, &[]).map(|own| own.drive)
+        culprit(3, seen, trials, &[]).map(|culprit| culprit.drive)
     }
 
     #[test]
@@ -499,7 +500,7 @@ mod tests {
             let step = |step: u8| (step, at.contains(&step).then_some(Meant::Behind(step)));
             let tried = trial(Meant::Behind(0), &[step(1), step(2)]);
             culprit(3, &[Meant::Behind(0)], &[tried], &[])
-                .map(|own| (own.drive, own.perhaps_of_all))
+                .map(|culprit| (culprit.drive, culprit.perhaps_of_all))
         };
         // Drive 0 alone is in the error mode where the error is in drive 0.
         assert_eq!(found(&[]), Some((0, false)));

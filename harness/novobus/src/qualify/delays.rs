@@ -71,13 +71,13 @@ pub(super) fn held_back(drives: u8, byte_time: Span, conversation: &Conversation
         };
         telegrams.entry(drive).or_default().push(late);
     }
-    if telegrams.values().any(|own| own.len() < ENOUGH) {
+    if telegrams.values().any(|telegrams| telegrams.len() < ENOUGH) {
         return Vec::new();
     }
     let rises = |drive: u8, place: usize| -> Vec<Span> {
         let rises = telegrams[&drive]
             .iter()
-            .map(|own| own[place].saturating_sub(own[place - 1]));
+            .map(|telegram| telegram[place].saturating_sub(telegram[place - 1]));
         rises.filter(|rise| *rise >= LATE).collect()
     };
     let quarters =
@@ -93,7 +93,7 @@ pub(super) fn held_back(drives: u8, byte_time: Span, conversation: &Conversation
         role: roles[place],
         by: rises(drive, place).into_iter().min().unwrap_or_default(),
     });
-    held.filter(|own| own.role.drive().is_some()).collect()
+    held.filter(|held| held.role.drive().is_some()).collect()
 }
 
 #[cfg(test)]
@@ -107,7 +107,7 @@ mod tests {
 
     /// A ring of three behind a computer that is late at random, and by 30 ms now and then; drive 1 holds this byte of its telegrams back.
     fn conversation(held: usize, by: Span) -> Conversation {
-        let mut own = Conversation::default();
+        let mut conversation = Conversation::default();
         let mut dice = fastrand::Rng::with_seed(7);
         let mut at = Instant::START;
         for drive in 0..3_u8 {
@@ -116,7 +116,7 @@ mod tests {
                 let bytes = bytes.into_iter().chain([0x80; 6]).enumerate();
                 let mut free = Instant::START;
                 for (place, byte) in bytes {
-                    own.done.push((0, Done::Sent(at, byte)));
+                    conversation.done.push((0, Done::Sent(at, byte)));
                     let noise = match dice.u8(..) {
                         0..=9 => Span::from_millis(30),
                         _ => Span::from_micros(dice.u64(..300)),
@@ -125,13 +125,14 @@ mod tests {
                     let delay = if held { by } else { Span::ZERO };
                     // A byte overtakes none.
                     free = (free + BYTE).max(at + BYTE * 4 + delay);
-                    own.received.push((0, free + noise, Received::good(byte)));
+                    let received = (0, free + noise, Received::good(byte));
+                    conversation.received.push(received);
                     at += BYTE;
                 }
                 at += Span::from_millis(11);
             }
         }
-        own
+        conversation
     }
 
     /// ND21 8.2: a checking byte that comes 5 ms late each time is that drive's, however busy the computer is.

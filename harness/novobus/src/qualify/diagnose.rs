@@ -120,12 +120,12 @@ pub(crate) fn name<E>(
         return named;
     }
     let mut relatives = name_among(seen, candidates(seen, RELATIVES.all()), twin);
-    let of_all = |named: &[Named]| named.iter().any(|own| own.whose == Whose::Every);
+    let of_all = |named: &[Named]| named.iter().any(|named| named.whose == Whose::Every);
     if named.is_empty() || of_all(&named) && !of_all(&relatives) && !relatives.is_empty() {
         return relatives;
     }
     let accused = drives(&named);
-    relatives.retain(|own| match &own.whose {
+    relatives.retain(|relative| match &relative.whose {
         Whose::Every => false,
         Whose::OneOf(some) => some.iter().any(|drive| !accused.contains(drive)),
     });
@@ -135,8 +135,8 @@ pub(crate) fn name<E>(
 
 /// The drives that some of these accuse.
 fn drives(named: &[Named]) -> BTreeSet<u8> {
-    let whose = named.iter().map(|own| &own.whose);
-    let some = whose.filter_map(|own| match own {
+    let whose = named.iter().map(|deviation| &deviation.whose);
+    let some = whose.filter_map(|whose| match whose {
         Whose::OneOf(some) => Some(some),
         Whose::Every => None,
     });
@@ -147,9 +147,9 @@ fn drives(named: &[Named]) -> BTreeSet<u8> {
 /// a deviation of any drive that one of them accuses.
 pub(super) fn proven(mut named: Vec<Named>) -> Vec<Named> {
     let all: Vec<u8> = drives(&named).into_iter().collect();
-    for own in &mut named {
-        if own.whose != Whose::Every {
-            own.whose = Whose::OneOf(all.clone());
+    for deviation in &mut named {
+        if deviation.whose != Whose::Every {
+            deviation.whose = Whose::OneOf(all.clone());
         }
     }
     named
@@ -173,16 +173,17 @@ fn name_among<E>(
     };
     let mut differing: Vec<_> = seen.differing.iter().take(most).collect();
     // The shortest first: it refutes most, and costs least.
-    differing.sort_by_key(|attempt| attempt.iter().map(|own| own.done.len()).sum::<usize>());
+    let length = |conversation: &Conversation| conversation.done.len();
+    differing.sort_by_key(|attempt| attempt.iter().map(length).sum::<usize>());
     for attempt in differing {
         if simulated && differed == MOST_SIMULATED {
             break;
         }
         let right = twin(&manual).map(|twin| fit(twin, attempt, seen.exactness));
         // What is not compared up to the byte that differs explains nothing, and neither does a drive that is right where this one is wrong.
-        let better = |own: &Fit| match right {
-            Ok(Ok(right)) => own.timely && !right.timely,
-            Ok(Err(differs)) => own.compared >= differs && own.against <= MOST_AGAINST,
+        let better = |fit: &Fit| match right {
+            Ok(Ok(right)) => fit.timely && !right.timely,
+            Ok(Err(differs)) => fit.compared >= differs && fit.against <= MOST_AGAINST,
             Err(_) => true,
         };
         if matches!(right, Ok(Ok(right)) if right.timely) {
@@ -190,24 +191,25 @@ fn name_among<E>(
         }
         differed += 1;
         candidates.retain_mut(|candidate| {
-            let own = explains(&candidate.header(), attempt).filter(better);
-            candidate.timely &= own.is_none_or(|own| own.timely);
-            candidate.explained += usize::from(own.is_some());
+            let fit = explains(&candidate.header(), attempt).filter(better);
+            candidate.timely &= fit.is_none_or(|fit| fit.timely);
+            candidate.explained += usize::from(fit.is_some());
             candidate.explained == differed || simulated
         });
-        let whole = candidates.iter().any(|own| own.explained == differed);
+        let mut explained = candidates.iter().map(|candidate| candidate.explained);
+        let whole = explained.any(|explained| explained == differed);
         if whole && differed >= ASKED_OF_ALL {
-            candidates.retain(|own| own.explained > 0);
+            candidates.retain(|candidate| candidate.explained > 0);
         }
     }
-    let most = candidates.iter().map(|own| own.explained).max();
-    candidates.retain(|own| own.explained > 0 && Some(own.explained) == most);
+    let most = candidates.iter().map(|candidate| candidate.explained).max();
+    candidates.retain(|candidate| candidate.explained > 0 && Some(candidate.explained) == most);
     for attempt in seen.alike {
         let right = explains(&manual, attempt).filter(|_| !simulated && !candidates.is_empty());
         let Some(right) = right else { continue };
         candidates.retain(|candidate| {
-            let own = explains(&candidate.header(), attempt);
-            own.is_some_and(|own| own.against <= right.against + MOST_AGAINST)
+            let fit = explains(&candidate.header(), attempt);
+            fit.is_some_and(|fit| fit.against <= right.against + MOST_AGAINST)
         });
     }
     simplest(candidates)
@@ -237,20 +239,22 @@ fn candidates(
 
 /// Those that explain the times too if any does, and of these those of single drives if there are some; one entry for each deviation.
 fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
-    if candidates.iter().any(|own| own.timely) {
-        candidates.retain(|own| own.timely);
+    if candidates.iter().any(|candidate| candidate.timely) {
+        candidates.retain(|candidate| candidate.timely);
     }
-    let of_all = candidates.iter().filter(|own| own.drive.is_none());
-    let of_all: BTreeSet<&str> = of_all.map(|own| own.deviation.name).collect();
-    if candidates.iter().any(|own| own.drive.is_some()) {
-        candidates.retain(|own| own.drive.is_some());
+    let of_one = |candidate: &Candidate| candidate.drive.is_some();
+    let of_all = candidates.iter().filter(|candidate| !of_one(candidate));
+    let of_all: BTreeSet<&str> = of_all.map(|candidate| candidate.deviation.name).collect();
+    if candidates.iter().any(of_one) {
+        candidates.retain(of_one);
     }
     let of_one = candidates.chunk_by(|one, other| one.deviation.name == other.deviation.name);
-    let named = of_one.map(|own| {
-        let drives: Vec<u8> = own.iter().filter_map(|own| own.drive).collect();
+    let named = of_one.map(|alike| {
+        let drives = alike.iter().filter_map(|candidate| candidate.drive);
+        let drives: Vec<u8> = drives.collect();
         Named {
-            deviation: own[0].deviation,
-            perhaps_of_all: !drives.is_empty() && of_all.contains(own[0].deviation.name),
+            deviation: alike[0].deviation,
+            perhaps_of_all: !drives.is_empty() && of_all.contains(alike[0].deviation.name),
             whose: match drives.is_empty() {
                 true => Whose::Every,
                 false => Whose::OneOf(drives),
@@ -294,7 +298,7 @@ mod tests {
         let none = |drives: &[u8]| named("adds-0-in-error-mode", drives);
         for lines in [text(vec![none(&[1])]), text(vec![none(&[1]), zeros(&[1])])] {
             assert!(
-                lines.iter().all(|own| own.starts_with("drive 1: ")),
+                lines.iter().all(|line| line.starts_with("drive 1: ")),
                 "{lines:?}"
             );
         }
@@ -303,7 +307,7 @@ mod tests {
             text(vec![none(&[0, 1]), zeros(&[0])]),
         ] {
             let unknown = "not known which drive: one of 0, 1";
-            let open = |own: &String| own.ends_with(unknown) && !own.starts_with("drive");
+            let open = |line: &String| line.ends_with(unknown) && !line.starts_with("drive");
             assert!(lines.iter().all(open), "{lines:?}");
         }
     }

@@ -132,25 +132,25 @@ fn values(drives: u8, drive: u8, read: &[Conversation]) -> BTreeMap<u8, u8> {
         for (index, role) in roles(size, &sent).into_iter().enumerate() {
             match role {
                 Role::Check {
-                    drive: Some(own),
+                    drive: Some(axis),
                     writes: Some((ram::EEPROM_BUFFER, width)),
                     ..
-                } if own == drive => {
+                } if axis == drive => {
                     let place = index.checked_sub(3);
-                    asked = place.filter(|_| width == 1).map(|own| sent[own].0);
+                    asked = place.filter(|_| width == 1).map(|place| sent[place].0);
                 }
                 Role::Data {
-                    drive: Some(own),
+                    drive: Some(axis),
                     address: ram::EEPROM_BUFFER,
-                } if own == drive => {
+                } if axis == drive => {
                     let (_, _, byte) = conversation.received[index];
                     held.extend(asked.take().map(|cell| (cell, byte.byte)));
                 }
                 Role::Check {
-                    drive: Some(own),
+                    drive: Some(axis),
                     writes: Some((cell, _)),
                     ..
-                } if own == drive && EEPROM.contains(&cell) && cell != ram::EEPROM_CONTROL => {
+                } if axis == drive && EEPROM.contains(&cell) && cell != ram::EEPROM_CONTROL => {
                     asked = None;
                 }
                 _ => {}

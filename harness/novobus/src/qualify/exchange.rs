@@ -62,32 +62,32 @@ impl Sent {
         drives: u8,
         byte_time: Span,
     ) -> Option<Self> {
-        let mut own = Self::default();
+        let mut exchange = Self::default();
         for conversation in attempt.get(begin(attempt, drives)..=last)? {
-            let before = own.bytes.len() as u64;
-            own.bytes.extend(conversation.sent_in(0));
+            let before = exchange.bytes.len() as u64;
+            exchange.bytes.extend(conversation.sent_in(0));
             let mut free = Instant::START;
             for (ring, done) in &conversation.done {
                 match done {
                     _ if *ring != 0 => return None,
                     Done::Sent(at, _) => {
-                        own.gap(at.since(free));
+                        exchange.gap(at.since(free));
                         free = *at + byte_time;
-                        own.pieces.push(Piece::Byte);
+                        exchange.pieces.push(Piece::Byte);
                     }
                     Done::Fault(_, PlacedFault::Link(0, fault), Moment::Byte(number))
                         if is_written_as_read(fault) =>
                     {
-                        own.pieces.push(Piece::Fault(before + number, *fault));
+                        exchange.pieces.push(Piece::Fault(before + number, *fault));
                     }
                     Done::Fault(..) => return None,
                     Done::Step(_) => {}
                 }
             }
-            own.gap(conversation.end.since(free));
+            exchange.gap(conversation.end.since(free));
         }
-        own.roles = roles(RingSize::new(u64::from(drives)).ok()?, &own.bytes);
-        Some(own)
+        exchange.roles = roles(RingSize::new(u64::from(drives)).ok()?, &exchange.bytes);
+        Some(exchange)
     }
 
     /// The bytes, and what each is for.
@@ -102,7 +102,7 @@ impl Sent {
             return;
         }
         match self.pieces.last_mut() {
-            Some(Piece::Gap(own)) => *own = *own + gap,
+            Some(Piece::Gap(last)) => *last = *last + gap,
             _ => self.pieces.push(Piece::Gap(gap)),
         }
     }
@@ -120,7 +120,7 @@ impl Sent {
         let faults = self
             .pieces
             .iter()
-            .any(|own| matches!(own, Piece::Fault(..)));
+            .any(|piece| matches!(piece, Piece::Fault(..)));
         let kept = match count > LONG && !faults {
             true => self.kept(drive),
             false => None,
@@ -128,25 +128,25 @@ impl Sent {
         let Some(kept) = kept else {
             return (self, count);
         };
-        let mut own = Self::default();
+        let mut exchange = Self::default();
         let mut index = 0;
         for piece in self.pieces {
             match piece {
                 Piece::Byte => {
                     if kept[index] {
-                        own.pieces.push(Piece::Byte);
-                        own.bytes.push(self.bytes[index]);
-                        own.roles.push(self.roles[index]);
+                        exchange.pieces.push(Piece::Byte);
+                        exchange.bytes.push(self.bytes[index]);
+                        exchange.roles.push(self.roles[index]);
                     }
                     index += 1;
                 }
                 // The gap behind a telegram belongs to it.
-                Piece::Gap(gap) if index == 0 || kept[index - 1] => own.gap(gap),
+                Piece::Gap(gap) if index == 0 || kept[index - 1] => exchange.gap(gap),
                 Piece::Gap(_) | Piece::Fault(..) => {}
             }
         }
         let count = kept[..count].iter().filter(|kept| **kept).count();
-        (own, count)
+        (exchange, count)
     }
 
     /// Which bytes are no part of a telegram to another drive; `None` where a telegram has a short address.
@@ -166,7 +166,7 @@ impl Sent {
             }
             let end = (start + header.telegram_length()).min(self.bytes.len());
             let others = match self.roles.get(start + 1) {
-                Some(Role::Address { drive: Some(own) }) => *own != drive,
+                Some(Role::Address { drive: Some(axis) }) => *axis != drive,
                 _ => false,
             };
             if others && !self.roles[start..end].contains(&Role::Foreign) {
@@ -179,7 +179,7 @@ impl Sent {
     /// The first `count` bytes with an address byte in place of each short address, and how many they are then; `None` where a telegram
     /// has no byte that needs an address, or a fault is meant for a byte that would have another number.
     pub(super) fn with_addresses(&self, count: usize, drives: u8) -> Option<(Self, usize)> {
-        let mut own = Self::default();
+        let mut exchange = Self::default();
         let mut index = 0;
         for piece in &self.pieces {
             match piece {
@@ -204,18 +204,18 @@ impl Sent {
                         _ => (byte, None),
                     };
                     for byte in iter::once(byte).chain(address) {
-                        own.pieces.push(Piece::Byte);
-                        own.bytes.push((byte, whole));
+                        exchange.pieces.push(Piece::Byte);
+                        exchange.bytes.push((byte, whole));
                     }
                     index += 1;
                 }
-                Piece::Gap(gap) => own.gap(*gap),
+                Piece::Gap(gap) => exchange.gap(*gap),
                 Piece::Fault(..) => return None,
             }
         }
-        own.roles = roles(RingSize::new(u64::from(drives)).ok()?, &own.bytes);
-        let count = own.bytes.len();
-        Some((own, count))
+        exchange.roles = roles(RingSize::new(u64::from(drives)).ok()?, &exchange.bytes);
+        let count = exchange.bytes.len();
+        Some((exchange, count))
     }
 
     /// The text of a scenario that sends the first `count` bytes again, each telegram `step` addresses on in a ring of `drives`. `None` where it
@@ -272,12 +272,12 @@ impl Sent {
                 let last = at.checked_sub(3)?;
                 let place = last.checked_sub(usize::from(cell - address))?;
                 (place..at)
-                    .all(|own| whole(&own))
+                    .all(|place| whole(&place))
                     .then(|| self.bytes[place].0)
             };
             for cell in cells.filter(|cell| EEPROM.contains(cell)) {
                 let Some(data) = data(cell) else { return true };
-                let customers = |own: &u8| CUSTOMERS.contains(own);
+                let customers = |cell: &u8| CUSTOMERS.contains(cell);
                 match (cell, data) {
                     (ram::EEPROM_BUFFER, _) => {
                         buffers.insert(drive, data);
@@ -376,8 +376,8 @@ pub(super) fn begin(attempt: &[Conversation], drives: u8) -> usize {
             }
         )
     };
-    let resets = |own: &Conversation| roles(size, &own.sent_in(0)).iter().any(is_reset);
-    let before = |own: &&Conversation| !own.has_steps();
+    let resets = |part: &Conversation| roles(size, &part.sent_in(0)).iter().any(is_reset);
+    let before = |part: &&Conversation| !part.has_steps();
     let before = attempt.iter().take_while(before).count();
     let last = attempt[..before].iter().rposition(resets);
     last.map_or(0, |last| last + 1)

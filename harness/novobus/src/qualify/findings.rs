@@ -56,7 +56,7 @@ pub(super) struct Findings {
     skipped: usize,
     /// Bytes compared, and bytes whose values only the drives know.
     bytes: u64,
-    own: u64,
+    unknown: u64,
     /// How many probes were asked.
     probes: usize,
     /// Whether a scenario or a probe has failed.
@@ -91,9 +91,9 @@ impl Findings {
         self.note_attempts(name, played);
         self.played += 1;
         for comparison in &last.beside().comparisons {
-            let own = comparison.measured + comparison.adopted.len() as u64;
-            self.bytes += comparison.compared.saturating_sub(own);
-            self.own += own;
+            let unknown = comparison.measured + comparison.adopted.len() as u64;
+            self.bytes += comparison.compared.saturating_sub(unknown);
+            self.unknown += unknown;
         }
         match self.why_open(played, last) {
             None => {
@@ -128,10 +128,10 @@ impl Findings {
     /// Why a scenario was not compared to its end, or not equal; `None` where it was both.
     fn why_open(&self, played: &PlayedScenario, last: &Attempt) -> Option<&'static str> {
         let differs = differs(last);
-        let left_out = last.beside().comparisons.iter().any(|own| own.left_out);
-        let monitored = last.beside().comparisons.iter().any(|own| own.monitored);
-        let whole =
-            last.beside().comparisons.len() == last.beside().conversations.len() && !left_out;
+        let comparisons = &last.beside().comparisons;
+        let left_out = comparisons.iter().any(|compared| compared.left_out);
+        let monitored = comparisons.iter().any(|compared| compared.monitored);
+        let whole = comparisons.len() == last.beside().conversations.len() && !left_out;
         Some(match played.outcome.verdict {
             Verdict::Skipped => "the drives could not be made ready",
             Verdict::Inconclusive if last.is_silenced() => {
@@ -165,16 +165,16 @@ impl Findings {
             self.master_is_wrong |= !attempt.master_is_right;
             let sighting = self.sighting(attempt);
             self.sightings
-                .extend(sighting.map(|own| (name.to_owned(), own)));
+                .extend(sighting.map(|sighting| (name.to_owned(), sighting)));
         }
         let Some((attempt, divergences)) = played.telling(self.tolerance > Span::ZERO) else {
             return;
         };
-        let own = match attempt.beside().driven {
+        let attempts = match attempt.beside().driven {
             Some(_) => &mut self.with_driver,
             None => &mut self.differing,
         };
-        own.push(attempt.beside().conversations.clone());
+        attempts.push(attempt.beside().conversations.clone());
         for there in divergences {
             self.suspects
                 .extend(there.drive.into_iter().chain(there.role.drive()));
@@ -186,7 +186,7 @@ impl Findings {
     /// Where an attempt differed.
     fn sighting(&self, attempt: &Attempt) -> Option<Sighting> {
         let mut comparisons = attempt.beside().comparisons.iter().enumerate();
-        let found = comparisons.find(|(_, own)| own.divergence.is_some());
+        let found = comparisons.find(|(_, comparison)| comparison.divergence.is_some());
         let found = found.filter(|_| attempt.outcome.verdict == Verdict::Failed)?;
         Sighting::of(
             &attempt.beside().conversations,
@@ -232,7 +232,8 @@ impl Findings {
     /// The drive that alone explains where attempts differed, as far as the bytes and the trials say.
     fn culprit(&self) -> Option<Culprit> {
         // What was seen only once may be a byte that was damaged on its way.
-        let seen: Vec<_> = self.sightings.iter().map(|(_, own)| own.meant).collect();
+        let seen = self.sightings.iter().map(|(_, sighting)| sighting.meant);
+        let seen: Vec<_> = seen.collect();
         let found = culprit(self.drives, &seen, &self.trials, &self.pinned);
         found.filter(|_| seen.len() > 1)
     }
@@ -303,8 +304,8 @@ impl Findings {
             let more = self.open.len() - MOST_LISTED;
             let _infallible = writeln!(text, "  and {more} more");
         }
-        for own in &self.in_part {
-            let _infallible = writeln!(text, "compared in part: {own}");
+        for note in &self.in_part {
+            let _infallible = writeln!(text, "compared in part: {note}");
         }
         text
     }
@@ -312,7 +313,8 @@ impl Findings {
     /// Which deviations there are, as far as is known.
     fn verdict(&self, named: Option<&[Named]>, known: &[String]) -> String {
         let held_back = self.held_back.iter();
-        let mut text: String = held_back.map(|own| format!("deviation: {own}\n")).collect();
+        let lines = held_back.map(|held| format!("deviation: {held}\n"));
+        let mut text: String = lines.collect();
         let count = self.counts();
         // Writing to a String cannot fail.
         if self.differ() && named.is_none() {
@@ -373,12 +375,13 @@ impl Findings {
         let Some(culprit) = culprit else {
             return "deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n".to_owned();
         };
-        let shown = self.pinned.iter().filter(|own| own.drive == culprit.drive);
+        let pinned = self.pinned.iter();
+        let shown = pinned.filter(|pinned| pinned.drive == culprit.drive);
         let mut shown: Vec<String> = shown
-            .map(|own| {
+            .map(|pinned| {
                 format!(
-                    "deviation: {culprit}: no known deviation explains it (ND21 {}): {own}\n",
-                    own.section
+                    "deviation: {culprit}: no known deviation explains it (ND21 {}): {pinned}\n",
+                    pinned.section
                 )
             })
             .collect();
@@ -387,21 +390,21 @@ impl Findings {
             return shown.concat();
         }
         let mut sections: Vec<(&str, usize, &(String, Sighting))> = Vec::new();
-        for own in &self.sightings {
+        for seen @ (_, sighting) in &self.sightings {
             match sections
                 .iter_mut()
-                .find(|(known, ..)| *known == own.1.section)
+                .find(|(known, ..)| *known == sighting.section)
             {
                 Some((_, count, _)) => *count += 1,
-                None => sections.push((own.1.section, 1, own)),
+                None => sections.push((sighting.section, 1, seen)),
             }
         }
         sections.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
-        let lines = sections.iter().take(MOST_SECTIONS).map(|(section, count, (name, own))| {
+        let lines = sections.iter().take(MOST_SECTIONS).map(|(section, count, (name, sighting))| {
             format!(
                 "deviation: {culprit}: no known deviation explains it (ND21 {section}): seen in {}, one of them at {name}: {}\n",
                 counted(*count, "attempt"),
-                own.about
+                sighting.about
             )
         });
         lines.collect()
@@ -415,7 +418,7 @@ impl Findings {
             self.played,
             self.skipped,
             counted(self.bytes, "byte"),
-            self.own,
+            self.unknown,
             counted(self.probes, "probe")
         )
     }
@@ -424,7 +427,7 @@ impl Findings {
 /// Whether a byte of an attempt differs from the model's.
 fn differs(attempt: &Attempt) -> bool {
     let mut comparisons = attempt.beside().comparisons.iter();
-    comparisons.any(|own| own.divergence.is_some())
+    comparisons.any(|comparison| comparison.divergence.is_some())
 }
 
 #[cfg(test)]

@@ -70,10 +70,8 @@ impl Parts {
             return false;
         }
         let attempts = played.attempts.iter();
-        let heard = attempts
-            .map(|own| Bytes::all(&own.beside().conversations))
-            .collect();
-        let heard = (played.outcome.verdict, heard);
+        let heard = attempts.map(|attempt| Bytes::all(&attempt.beside().conversations));
+        let heard = (played.outcome.verdict, heard.collect());
         if self.other.is_some() {
             return self.conversations.get(name) == Some(&heard);
         }
@@ -86,7 +84,8 @@ impl Parts {
         if !self.several {
             return false;
         }
-        let heard = conversations.iter().map(|own| Bytes::all(own)).collect();
+        let heard = conversations.iter().map(Vec::as_slice);
+        let heard = heard.map(Bytes::all).collect();
         if self.other.is_some() {
             return self.probe == heard;
         }
@@ -129,10 +128,10 @@ impl Asking {
         all: impl IntoIterator<Item = Self>,
     ) -> Result<Self, String> {
         let mut agreed = Self::Open("not asked".to_owned());
-        for (place, own) in all.into_iter().enumerate() {
+        for (place, asking) in all.into_iter().enumerate() {
             agreed = match place {
-                0 => own,
-                _ => agreed.and(own, property, drive)?,
+                0 => asking,
+                _ => agreed.and(asking, property, drive)?,
             };
         }
         Ok(agreed)
@@ -147,13 +146,13 @@ impl Asking {
             (Self::Open(_), _) => Ok(other),
             (
                 Self::Settled {
-                    span: Some(own), ..
+                    span: Some(this), ..
                 },
                 Self::Settled {
                     span: Some(other), ..
                 },
-            ) if own.0.max(other.0) <= own.1.min(other.1) => {
-                let (from, to) = (own.0.max(other.0), own.1.min(other.1));
+            ) if this.0.max(other.0) <= this.1.min(other.1) => {
+                let (from, to) = (this.0.max(other.0), this.1.min(other.1));
                 match between(property, drive.unwrap_or(0), from, to) {
                     Answer::Settled {
                         value,
@@ -202,7 +201,7 @@ mod tests {
 
     fn agreed(all: impl IntoIterator<Item = Asking>) -> Result<String, String> {
         let agreed = Asking::agreed("eeprom-time", Some(1), all);
-        agreed.map(|own| own.text().to_owned())
+        agreed.map(|asking| asking.text().to_owned())
     }
 
     /// Parts that were played at other moments bracket the same time in another way.

@@ -90,15 +90,15 @@ pub(crate) fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Que
         return Vec::new();
     }
     let mut shortest: Vec<_> = sightings.iter().collect();
-    shortest.sort_by_key(|(_, own)| own.length());
+    shortest.sort_by_key(|(_, sighting)| sighting.length());
     let mut questions: Vec<Question<'_>> = Vec::new();
     let mut asked = BTreeSet::new();
     for (name, sighting) in shortest {
         let Some(kind) = Kind::of(sighting, drives) else {
             continue;
         };
-        let alike = |own: &&Question<'_>| {
-            std::mem::discriminant(&own.kind) == std::mem::discriminant(&kind)
+        let alike = |question: &&Question<'_>| {
+            std::mem::discriminant(&question.kind) == std::mem::discriminant(&kind)
         };
         let most = if matches!(kind, Kind::Cell(_)) {
             1
@@ -176,11 +176,11 @@ impl Question<'_> {
     /// time-out (9.9). Any other drive may have been sent something else by a drive in front of it.
     fn refused(&self, conversations: &[Conversation]) -> Option<Pinned> {
         let pairs = pairs(conversations.last()?)?;
-        let is_synco = |own: &[(u8, u8)]| own.iter().all(|(sent, _)| *sent == SYNCO);
+        let is_synco = |window: &[(u8, u8)]| window.iter().all(|(sent, _)| *sent == SYNCO);
         let asked = pairs.windows(SPELLED_WITHIN).rposition(is_synco)? + SPELLED_WITHIN;
         let tail = &pairs[asked - SPELLED..asked];
         let (_, drive) = tail[0];
-        if tail.iter().any(|(_, own)| *own != drive) || drive >= self.drives {
+        if tail.iter().any(|(_, spelled)| *spelled != drive) || drive >= self.drives {
             return None;
         }
         let code = code(&pairs[asked..], drive);
@@ -215,7 +215,7 @@ fn broken(
     code: Option<u8>,
     addressed: &[Option<u8>],
 ) -> Option<(Option<&'static str>, &'static str)> {
-    let not_its_own = !addressed.is_empty() && addressed.iter().all(|own| *own != Some(drive));
+    let not_its_own = !addressed.is_empty() && !addressed.contains(&Some(drive));
     match code {
         Some(code) if LINE_ERRORS.contains(&code) => None,
         Some(TIME_OUT) => Some((Some("9.9"), "it reports a time-out")),
@@ -258,16 +258,17 @@ fn pairs(conversation: &Conversation) -> Option<Vec<(u8, u8)>> {
     let came = &conversation.received;
     let unanswered = sent.len().checked_sub(came.len())?;
     let sent = sent[unanswered..].iter().map(|(byte, _)| *byte);
-    Some(sent.zip(came.iter().map(|(_, _, own)| own.byte)).collect())
+    let answers = came.iter().map(|(_, _, answer)| answer.byte);
+    Some(sent.zip(answers).collect())
 }
 
 /// The low byte of a drive's code of an error of the bus.
 fn code(pairs: &[(u8, u8)], drive: u8) -> Option<u8> {
     let byte = |cell: u16| {
         let [high, low] = cell.to_be_bytes();
-        pairs.windows(6).find_map(|own| match own {
-            [_, (_, own), (0xC0, _), (l, _), (h, data), _]
-                if (*h, *l, *own) == (high, low, drive) =>
+        pairs.windows(6).find_map(|window| match window {
+            [_, (_, address), (0xC0, _), (l, _), (h, data), _]
+                if (*h, *l, *address) == (high, low, drive) =>
             {
                 Some(*data)
             }
@@ -330,7 +331,7 @@ fn taken_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinn
     let asked = read_behind(byte);
     let answer = pairs
         .windows(asked.len())
-        .find(|own| own.iter().map(|own| own.0).eq(asked))?;
+        .find(|window| window.iter().map(|(sent, _)| *sent).eq(asked))?;
     let [_, (_, address), .., (_, data), _] = answer else {
         return None;
     };
@@ -373,8 +374,8 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
     let pairs = pairs(conversations.last()?)?;
     // Each drive has taken its own mark, so that the marks tell the answers apart.
     let marked = |drive: u8| {
-        pairs.windows(4).any(|own| {
-            let [_, (_, address), (command, _), (data, _)] = own else {
+        pairs.windows(4).any(|window| {
+            let [_, (_, address), (command, _), (data, _)] = window else {
                 return false;
             };
             (*address, *command, *data) == (drive, WRITE_BYTE, drive + 1)
@@ -385,15 +386,16 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
     }
     let sent = [0x82, byte, 0xC0];
     let mut asked = pairs.windows(sent.len());
-    let asked = asked.position(|own| own.iter().map(|own| own.0).eq(sent))?;
+    let asked = asked.position(|window| window.iter().map(|(sent, _)| *sent).eq(sent))?;
     let came: Vec<u8> = pairs[asked..].iter().map(|(_, came)| *came).collect();
     let steps = steps(drives, byte);
-    let data = |step: usize| came.get(3 + 6 * (step - 1)..).and_then(|own| own.get(..5));
+    let data = |step: usize| came.get(6 * step - 3..)?.get(..5);
     // Where two drives answer at once, one of them refuses what the other has sent.
-    let answers =
-        |drive: u8, step: usize| data(step).is_some_and(|own| own[3] == drive + 1 || own[4] == 0);
+    let answers = |drive: u8, step: usize| {
+        data(step).is_some_and(|answer| answer[3] == drive + 1 || answer[4] == 0)
+    };
     let before_errors =
-        |step: usize| (1..=step).all(|step| data(step).is_some_and(|own| own[0] == 0xE8));
+        |step: usize| (1..=step).all(|step| data(step).is_some_and(|answer| answer[0] == 0xE8));
     let moved = |drive: u8| {
         let step = steps[usize::from(drive)];
         before_errors(step).then(|| !answers(drive, step))
@@ -402,20 +404,20 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
     let wrong: Vec<u8> = (0..drives)
         .filter(|drive| all[usize::from(*drive)] == Some(true))
         .collect();
-    let known = all.iter().filter(|own| own.is_some()).count() == all.len();
+    let known = all.iter().filter(|moved| moved.is_some()).count() == all.len();
     let next_is_right = |drive: u8| {
         let next = all.get(usize::from(drive) + 1);
-        next.is_none_or(|own| *own == Some(false))
+        next.is_none_or(|moved| *moved == Some(false))
     };
     let (drive, section) = match (
         came.get(1) == Some(&byte.wrapping_add(drives)),
         wrong.as_slice(),
     ) {
         (false, []) if known => (0, "9.3"),
-        (false, [.., own]) if wrong.len() == usize::from(*own) + 1 && next_is_right(*own) => {
-            (*own, "9.3")
+        (false, [.., drive]) if wrong.len() == usize::from(*drive) + 1 && next_is_right(*drive) => {
+            (*drive, "9.3")
         }
-        (true, [own]) if known => (*own, "9.2"),
+        (true, [drive]) if known => (*drive, "9.2"),
         _ => return None,
     };
     Some(Pinned {

@@ -173,7 +173,7 @@ pub(crate) fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             of_silent: None,
         });
     }
-    let is_first = |first| move |own: &&Property| (own.name == SELF_TEST_BUS) == first;
+    let is_first = |first| move |property: &&Property| (property.name == SELF_TEST_BUS) == first;
     let (first, then) = (OF_THE_DRIVE.iter(), OF_THE_DRIVE.iter());
     for property in first
         .filter(is_first(true))
@@ -347,10 +347,10 @@ pub(crate) fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let places = places.take(if drives > 1 && !times { 1_000 } else { 0 });
     hypotheses.extend(places.map(|(value, other, drive)| {
         let (value, other) = (alike(&values[value]), &values[other]);
-        let own = Setup::new(DriveRange::one(0, drive), other.clone());
+        let setup = Setup::new(DriveRange::one(0, drive), other.clone());
         Hypothesis {
             name: format!("{}, but drive {drive} {}", value.name, other.value()),
-            header: value.header.and(&own.into()),
+            header: value.header.and(&setup.into()),
         }
     }));
     hypotheses
@@ -403,8 +403,8 @@ mod tests {
             let names = entries.iter().map(|entry| entry.short_name().to_owned());
             names.filter(|name| name.contains("location")).collect()
         };
-        let own = names(3, &|place| place == 0);
-        assert_eq!(own, ["qualify-location-master-to-2"]);
+        let outer = names(3, &|place| place == 0);
+        assert_eq!(outer, ["qualify-location-master-to-2"]);
         let inner = names(3, &|place| place < 2);
         assert_eq!(
             inner,

@@ -167,7 +167,7 @@ impl Qualification {
     /// Notes what parts of a qualification have not played, in sentences. How one of them ended is not held against the others.
     pub(crate) fn note_missing(&mut self, missing: &[String]) {
         let missing = missing.iter().cloned();
-        missing.for_each(|own| self.findings.note_open(own));
+        missing.for_each(|sentence| self.findings.note_open(sentence));
         self.lacks_a_part = true;
         self.ill = false;
     }
@@ -175,9 +175,10 @@ impl Qualification {
     /// Takes over the choices with which a scenario was compared, for what is asked of the ring later.
     fn assume(&mut self, played: &PlayedScenario) {
         if self.assumed.setups.is_empty() {
-            let assumed = played.attempts.iter().map(|own| &own.beside().assumed);
-            let found = assumed.into_iter().find(|own| !own.setups.is_empty());
-            found.into_iter().for_each(|own| self.assumed = own.clone());
+            let attempts = played.attempts.iter();
+            let mut assumed = attempts.map(|attempt| &attempt.beside().assumed);
+            let found = assumed.find(|header| !header.setups.is_empty());
+            self.assumed = found.unwrap_or(&self.assumed).clone();
         }
     }
 
@@ -207,7 +208,7 @@ impl Qualification {
             self.parts.keep();
         }
         let mut ended = self.converse(bench)?;
-        self.on_others(bench, |own, other| own.converse(other).map(|_ended| ()))?;
+        self.on_others(bench, |course, other| course.converse(other).map(drop))?;
         let (profile, settled) = self.profile(bench)?;
         if !ended {
             self.ask_ring(bench)?;
@@ -277,11 +278,12 @@ impl Qualification {
     /// Notes which drives hold bytes back. Where times are exact the model has judged them.
     fn measure(&mut self, played: &PlayedScenario) {
         let last = played.last_played().and_then(Attempt::sound);
-        let last = last.and_then(|own| own.beside().conversations.last());
+        let last = last.and_then(|attempt| attempt.beside().conversations.last());
         let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
-        let held = last.map(|own| held_back(self.drives, self.facts.byte_time, own));
-        for own in held.into_iter().flatten() {
-            let what = self.parts.named(&own.to_string());
+        let byte_time = self.facts.byte_time;
+        let held = last.map(|conversation| held_back(self.drives, byte_time, conversation));
+        for held in held.into_iter().flatten() {
+            let what = self.parts.named(&held.to_string());
             self.findings.note_held_back(what);
         }
     }
@@ -345,10 +347,10 @@ impl Qualification {
             }
             let played = bench.play(&question.entry)?;
             let last = played.last_played().and_then(Attempt::sound);
-            let shown = last.and_then(|own| question.answer(&own.beside().conversations));
+            let shown = last.and_then(|attempt| question.answer(&attempt.beside().conversations));
             shown
                 .into_iter()
-                .for_each(|own| self.findings.note_pinned(own));
+                .for_each(|pinned| self.findings.note_pinned(pinned));
         }
         Ok(())
     }
@@ -415,7 +417,8 @@ impl Qualification {
         &mut self,
         bench: &mut B,
     ) -> Result<(Profile<Header>, Header), B::Stop> {
-        let rings: Vec<u8> = self.facts.rig.rings().map(|(_, own)| own.drives).collect();
+        let rings = self.facts.rig.rings().map(|(_, ring)| ring.drives);
+        let rings: Vec<u8> = rings.collect();
         let mut profile = Profile {
             schema: 1,
             rig: self.facts.rig.id().to_owned(),
@@ -467,8 +470,8 @@ impl Qualification {
         known: &Header,
     ) -> Result<Asking, B::Stop> {
         let mut all = vec![self.ask(bench, probe, known)?];
-        self.on_others(bench, |own, other| {
-            all.push(own.ask(other, probe, known)?);
+        self.on_others(bench, |course, other| {
+            all.push(course.ask(other, probe, known)?);
             Ok(())
         })?;
         let agreed = Asking::agreed(probe.property, probe.drive(), all);
@@ -536,11 +539,11 @@ impl Qualification {
         {
             return self.answer_of_silent(bench, (probe.property, drive), entry);
         }
-        let own = self.facts.exactness;
+        let exactness = self.facts.exactness;
         let exactness = Exactness {
             // A fresh twin does not hold what earlier scenarios have left in drives that are not reset.
-            knows_cells: own.knows_cells && self.facts.resets,
-            ..own
+            knows_cells: exactness.knows_cells && self.facts.resets,
+            ..exactness
         };
         // Simulated drives answer alike each time.
         let most = match exactness.tolerance {
@@ -556,7 +559,7 @@ impl Qualification {
             let mut late = false;
             for entry in &probe.entries {
                 let played = bench.play(entry)?;
-                let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
+                let Some(attempt) = played.last_played().filter(|last| last.was_played()) else {
                     self.findings.note_attempts(entry.short_name(), &played);
                     return Ok(Err(played.outcome.remarks.join("; ")));
                 };
@@ -602,10 +605,11 @@ impl Qualification {
         let Some(attempt) = played.last_played().and_then(Attempt::sound) else {
             return Ok(Err(played.outcome.remarks.join("; ")));
         };
-        let mut own = attempt.beside().conversations.iter();
-        let last = own.rfind(|own| own.has_steps());
+        let mut conversations = attempt.beside().conversations.iter();
+        let last = conversations.rfind(|conversation| conversation.has_steps());
         let place = (self.drives, drive);
-        let answer = last.map(|own| silence(property, place, own, self.facts.byte_time));
+        let byte_time = self.facts.byte_time;
+        let answer = last.map(|conversation| silence(property, place, conversation, byte_time));
         Ok(Ok(answer.unwrap_or(Answer::Unexplained)))
     }
 }

@@ -82,11 +82,11 @@ pub(crate) fn of_parts(
     let mut selected = BTreeMap::new();
     let mut records = Vec::new();
     for part in parts {
-        let own = part.selected.iter().map(|(_, case)| case);
+        let judged = part.selected.iter().map(|(_, case)| case);
         records.push(PartRecord {
             rig: &facts.rig,
-            thorough: is_thorough(&facts.rig, own.clone().chain(&part.cases)),
-            over: own.clone().any(|case| case.ends_the_run),
+            thorough: is_thorough(&facts.rig, judged.clone().chain(&part.cases)),
+            over: judged.clone().any(|case| case.ends_the_run),
             name: part.name,
             whole: part.whole,
             cases: part.cases,
@@ -94,18 +94,18 @@ pub(crate) fn of_parts(
         });
         selected.extend(part.selected);
     }
-    let is_thorough = records.iter().any(|own| own.thorough);
-    if let Some(own) = records
+    let is_thorough = records.iter().any(|record| record.thorough);
+    if let Some(record) = records
         .iter()
-        .find(|own| own.whole && own.thorough != is_thorough)
+        .find(|record| record.whole && record.thorough != is_thorough)
     {
         return Err(format!(
             "part {}: it was played without --thorough, and another part with it",
-            own.name
+            record.name
         ));
     }
     // Beside the others stands one that was played to its end if there is one, or else the one that came the furthest.
-    records.sort_by_key(|own| (!own.whole, Reverse(own.cases.len())));
+    records.sort_by_key(|record| (!record.whole, Reverse(record.cases.len())));
     let mut records = records.into_iter();
     let mut first = records.next().ok_or("there is no part")?;
     first.others = records.collect();
@@ -206,10 +206,10 @@ impl QualifiedBench for PartRecord<'_> {
     /// open.
     fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, Infallible> {
         let (name, sum) = (entry.short_name(), sum(entry.source.text.as_bytes()));
-        let is_trial = TRIALS.iter().any(|own| name.starts_with(own));
-        let own = self.take(&sum);
+        let is_trial = TRIALS.iter().any(|trial| name.starts_with(trial));
+        let played = self.take(&sum);
         let mut others = self.others.iter_mut().filter(|_| is_trial);
-        let played = own.or_else(|| others.find_map(|other| other.take(&sum)));
+        let played = played.or_else(|| others.find_map(|other| other.take(&sum)));
         Ok(played.unwrap_or_else(|| PlayedScenario::skipped(Why::RunEnded.into())))
     }
 

@@ -63,9 +63,9 @@ pub(crate) fn answer<E>(
         // The simplest ones first.
         for settings in 1..=MOST_SETTINGS {
             let simple = |h: &&Hypothesis| h.header.setups.len() == settings;
-            let own = all.iter().filter(simple).cloned();
-            let own: Vec<_> = own.collect();
-            let found = explaining_all(own, conversations, exactness, twin)?;
+            let simplest = all.iter().filter(simple).cloned();
+            let simplest: Vec<_> = simplest.collect();
+            let found = explaining_all(simplest, conversations, exactness, twin)?;
             // A time is the one that fits best. No byte tells one drive from another one.
             if settings > 1 && found.len() > 1 && all.iter().all(is_of_words) {
                 return Ok(Answer::Several(one_of(&found)));
@@ -103,7 +103,7 @@ pub(crate) fn answer<E>(
 /// Whether its settings are words.
 fn is_of_words(hypothesis: &Hypothesis) -> bool {
     let mut setups = hypothesis.header.setups.iter();
-    setups.all(|own| matches!(own.what, SetupKind::Word(..)))
+    setups.all(|setup| matches!(setup.what, SetupKind::Word(..)))
 }
 
 /// The hypotheses, for people.
@@ -111,7 +111,7 @@ fn one_of(found: &[(Hypothesis, Fit)]) -> String {
     let names = found
         .iter()
         .take(MOST_TOLD)
-        .map(|(own, _)| own.name.as_str());
+        .map(|(hypothesis, _)| hypothesis.name.as_str());
     let names: Vec<_> = names.collect();
     let more = match found.len().saturating_sub(MOST_TOLD) {
         0 => String::new(),
@@ -187,8 +187,7 @@ pub(super) fn silence(
         return Answer::Unexplained;
     };
     let roles = roles(size, &sent);
-    let is_check =
-        |role: &Role| matches!(role, Role::Check { drive: Some(own), .. } if *own == drive);
+    let is_check = |role: &Role| matches!(role, Role::Check { drive: Some(addressed), .. } if *addressed == drive);
     let Some(reset) = roles.iter().position(is_check).filter(|_| lost > 0) else {
         return Answer::Unexplained;
     };
@@ -216,8 +215,9 @@ fn explaining_all<E>(
         let all: Vec<_> = found.iter().map(|(h, _)| h.clone()).collect();
         let here = explaining(&all, set, exactness, twin)?;
         found.retain_mut(|(hypothesis, evidence)| {
-            let own = here.iter().find(|(h, _)| *h == hypothesis);
-            own.inspect(|(_, here)| evidence.apart = evidence.apart + here.apart)
+            let explained = here.iter().find(|(h, _)| *h == hypothesis);
+            explained
+                .inspect(|(_, here)| evidence.apart = evidence.apart + here.apart)
                 .is_some()
         });
     }

@@ -16,7 +16,7 @@ pub(super) fn possible(names: &[String], rig: &Rig) -> (Vec<Capability>, Limits)
         let limits = limits(rig, motion);
         for seen in [(true, true), (false, true), (true, false), (false, false)] {
             let able = abilities(rig, limits, seen);
-            let listed = able.iter().map(|own| own.name());
+            let listed = able.iter().map(|capability| capability.name());
             if listed.eq(names.iter().map(String::as_str)) {
                 return (able, limits);
             }

@@ -72,7 +72,8 @@ pub(super) fn judged(
     let driven = Driven::new(facts.plan, events, way, recorded, &outcome);
     // In real time a record does not hold every moment at which the master was asked.
     let driven = driven.filter(|_| rig.is_simulated());
-    let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
+    let driver = driven.as_ref();
+    let master_is_right = driver.is_none_or(|driver| driver.judge(&mut outcome));
     let facts = AttemptFacts {
         conversations: &conversations,
         comparisons: &comparisons,
@@ -122,12 +123,14 @@ pub(crate) trait OnRings {
 
 impl OnRings for Attempt {
     fn beside(&self) -> &BesideTwin {
-        let own = self.own.as_ref();
-        own.and_then(|own| own.downcast_ref()).unwrap_or(&NOTHING)
+        let beside = self.own.as_ref();
+        let beside = beside.and_then(|beside| beside.downcast_ref());
+        beside.unwrap_or(&NOTHING)
     }
 
     fn is_silenced(&self) -> bool {
-        self.beside().comparisons.iter().any(|own| own.silenced)
+        let mut comparisons = self.beside().comparisons.iter();
+        comparisons.any(|comparison| comparison.silenced)
     }
 
     fn sound(&self) -> Option<&Self> {

@@ -180,8 +180,8 @@ pub(crate) fn cause(
 /// The lines of the other rates, as a rig's file has them.
 fn other_lines(stated: Rate) -> String {
     let rates = [Rate::Baud38400, Rate::Baud19200, Rate::Baud9600];
-    let others = rates.iter().filter(|own| **own != stated);
-    let lines = others.map(|own| format!("`line = \"{} 8O1\"`", own.bits_per_second()));
+    let others = rates.iter().filter(|rate| **rate != stated);
+    let lines = others.map(|rate| format!("`line = \"{} 8O1\"`", rate.bits_per_second()));
     lines.collect::<Vec<_>>().join(" and ")
 }
 

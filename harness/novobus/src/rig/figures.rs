@@ -197,10 +197,10 @@ fn drives(
 
 /// How a drive contradicts the rig's file.
 fn contradiction(rig: &Rig, axis: Axis, identity: &Identity) -> Option<String> {
-    let own = |entry: &&harness_bench::rig::file::DriveEntry| {
+    let is_axis = |entry: &&harness_bench::rig::file::DriveEntry| {
         usize::from(entry.ring) == axis.ring() + 1 && entry.address == axis.drive()
     };
-    let stated = rig.file.drive.iter().find(own)?.serial.as_deref()?;
+    let stated = rig.file.drive.iter().find(is_axis)?.serial.as_deref()?;
     let found = identity.serial_number;
     // Written with leading zeros or without.
     if stated.parse().ok() == found && found.is_some() {

@@ -226,7 +226,7 @@ mod tests {
         let rig = parse(&source(&text)).expect("a rig");
         let conditions = rig.file.interlock.iter();
         let conditions: Vec<_> = conditions
-            .map(|own| condition(own).expect("checked"))
+            .map(|interlock| condition(interlock).expect("checked"))
             .collect();
         let [first, second] = &conditions[..] else {
             panic!("two of them: {conditions:?}");

@@ -153,14 +153,14 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> RingPace {
     if pass.len() < SENT {
         return RingPace::AsSent;
     }
-    let own = stated.byte_time().units();
+    let byte_time = stated.byte_time().units();
     let gaps = pass.windows(2).map(|pair| pair[1].0.since(pair[0].0));
     let gaps: Vec<u64> = gaps
-        .map(|gap| if gap > HELD { own } else { gap.units() })
+        .map(|gap| if gap > HELD { byte_time } else { gap.units() })
         .collect();
     let took: u64 = gaps.iter().sum();
     // Half as long again: nearer to half the rate than to the stated one.
-    if took < own * GAPS * 3 / 2 {
+    if took < byte_time * GAPS * 3 / 2 {
         return RingPace::AsSent;
     }
     let even = |rate: &Rate| {
@@ -176,7 +176,7 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> RingPace {
     let slower = |rate: &Rate| rate.bits_per_second() < stated.bits_per_second();
     let rate = Rate::ALL.into_iter().filter(slower).find(|rate| even(rate));
     rate.map_or_else(
-        || RingPace::Late(Span::from_units(took - own * GAPS)),
+        || RingPace::Late(Span::from_units(took - byte_time * GAPS)),
         RingPace::Slower,
     )
 }

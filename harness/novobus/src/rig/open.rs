@@ -45,11 +45,11 @@ pub(crate) fn open(
     let rate = stated_rate(rig);
     let mut wires = Vec::new();
     for (_, ring) in rig.rings() {
-        let own = Rate::from(ring.endpoint.line);
-        if own != rate {
+        let ring_rate = Rate::from(ring.endpoint.line);
+        if ring_rate != rate {
             let why = format!(
                 "ring 2 runs at {} bit/s, ring 1 at {}: both rings of a rig must have the same rate",
-                own.bits_per_second(),
+                ring_rate.bits_per_second(),
                 rate.bits_per_second()
             );
             return Err(failed(rig, &why));

@@ -6,11 +6,11 @@ use harness_proto::novobus::guard::Limits;
 
 /// What a rig's file and the command line allow together.
 pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
-    let own = &rig.file.limits;
-    let motion = own.allow_motion && (allow_motion || rig.is_simulated());
+    let allowed = &rig.file.limits;
+    let motion = allowed.allow_motion && (allow_motion || rig.is_simulated());
     let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);
     let slowest = speeds
-        .chain(own.max_speed.and_then(|most| match most {
+        .chain(allowed.max_speed.and_then(|most| match most {
             MaxSpeed::Rpm(speed) => Some(speed),
             // Refused in the file of a ring.
             MaxSpeed::Percent(_) => None,
@@ -19,13 +19,13 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         .reduce(f64::min);
     Limits {
         motion: motion && rig.file.drive.iter().all(|drive| drive.motion),
-        eeprom: own.allow_eeprom,
-        reset: own.allow_reset,
-        outputs: own.allow_outputs,
-        monitoring: own.allow_monitoring,
+        eeprom: allowed.allow_eeprom,
+        reset: allowed.allow_reset,
+        outputs: allowed.allow_outputs,
+        monitoring: allowed.allow_monitoring,
         // Rounded down; what is not a number is not a speed.
         max_speed: slowest.map(|rpm| rpm.clamp(0.0, 65_535.0).floor() as u16),
-        bytes_per_second: own.max_bytes_per_second,
+        bytes_per_second: allowed.max_bytes_per_second,
         ..Limits::default()
     }
 }
@@ -49,8 +49,8 @@ mod tests {
                 name: "desk.toml".to_owned(),
                 text: text.into(),
             };
-            let own = limits(&parse(&source).expect("a rig"), allow_motion);
-            (own.motion, own.max_speed)
+            let limits = limits(&parse(&source).expect("a rig"), allow_motion);
+            (limits.motion, limits.max_speed)
         };
         for (drive, allow_motion, expected) in [
             ("", true, (true, Some(250))),

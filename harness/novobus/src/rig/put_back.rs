@@ -201,11 +201,11 @@ impl Place {
 
 /// What is said of drives that hold something else than `values`, with the command that puts it back.
 fn sentences(values: &Values, why: &str, origin: &str) -> Vec<String> {
-    let axes: BTreeSet<_> = values.keys().map(|own| own.0).collect();
+    let axes: BTreeSet<_> = values.keys().map(|(axis, _)| *axis).collect();
     let of_drive = |axis: Axis| {
-        let own = values.iter().filter(|(place, _)| place.0 == axis);
+        let values = values.iter().filter(|(place, _)| place.0 == axis);
         let (mut assignments, mut words, mut moves) = (String::new(), String::new(), "");
-        for ((_, place), value) in own {
+        for ((_, place), value) in values {
             match place.assignment(*value) {
                 Ok((assignment, needs_motion)) => {
                     assignments += &format!(" {assignment}");
@@ -251,7 +251,7 @@ pub(super) fn remember(
     }
     let all = touched
         .iter()
-        .flat_map(|(axis, touched)| places(*touched).into_iter().map(|own| (*axis, own)));
+        .flat_map(|(axis, touched)| places(*touched).into_iter().map(|place| (*axis, place)));
     let mut wanted: BTreeSet<_> = all.collect();
     wanted.retain(|place| !session.drives().before.values.contains_key(place));
     if !first && wanted.is_empty() {
@@ -309,14 +309,14 @@ fn all_back(
     let touched = session.link().take_touched();
     let unread: BTreeSet<_> = touched
         .into_iter()
-        .flat_map(|(axis, touched)| places(touched).into_iter().map(move |own| (axis, own)))
+        .flat_map(|(axis, touched)| places(touched).into_iter().map(move |place| (axis, place)))
         .filter(|place| !values.contains_key(place))
         .collect();
     let mut by_drive: BTreeMap<Axis, String> = BTreeMap::new();
     for (axis, place) in unread {
         let name = place.assignment(0).map_or_else(
             |_| " GPO1 or GPO2".to_owned(),
-            |own| format!(" {}", own.0.split('=').next().unwrap_or_default()),
+            |(assignment, _)| format!(" {}", assignment.split('=').next().unwrap_or_default()),
         );
         by_drive.entry(axis).or_default().push_str(&name);
     }
@@ -379,16 +379,17 @@ fn read(bus: &OpenRings<'_>, places: &BTreeSet<(Axis, Place)>) -> Result<Values,
             }
         }
     }
-    let reads = cells.iter().map(|own| (own.0, own.2, own.3));
+    let reads = cells.iter();
+    let reads = reads.map(|(axis, _, address, width)| (*axis, *address, *width));
     let words = bus.read_many(reads)?;
     let mut words = cells.iter().zip(words);
     while let Some(((axis, place, ..), word)) = words.next() {
         let value = match place {
             Place::Monitoring => word & u16::from(flags2::MONITORING),
             Place::Outputs => {
-                let mut byte = || words.next().map_or(0, |own| own.1.to_be_bytes()[1]);
-                let own = outputs_of_the_bus(byte(), byte());
-                u16::from_be_bytes([own, word.to_be_bytes()[1]])
+                let mut byte = || words.next().map_or(0, |(_, word)| word.to_be_bytes()[1]);
+                let outputs = outputs_of_the_bus(byte(), byte());
+                u16::from_be_bytes([outputs, word.to_be_bytes()[1]])
             }
             _ => word,
         };
@@ -422,10 +423,10 @@ fn values_back(
     for turn in 0..=TRIES {
         let places = values.keys().copied().collect();
         match with_bus(link, rings, |bus| read(bus, &places)) {
-            Ok(now) => values.retain(|own, before| {
+            Ok(now) => values.retain(|key, before| {
                 let written = turn > 0;
-                now.get(own)
-                    .is_none_or(|now| own.1.differs(*before, *now, written))
+                now.get(key)
+                    .is_none_or(|now| key.1.differs(*before, *now, written))
             }),
             Err(error) => {
                 why = error.to_string();
@@ -438,13 +439,13 @@ fn values_back(
             let commands = place.commands(*before).into_iter();
             let size = rings.get(axis.ring()).copied();
             let bytes: Vec<_> = commands
-                .filter_map(|own| Some(telegram(size?, axis.drive(), own)))
+                .filter_map(|command| Some(telegram(size?, axis.drive(), command)))
                 .flatten()
                 .collect();
             let denied = link.denied(axis.ring(), Out::Octets(&bytes));
             if let Some(why) = &denied {
-                let own = left.entry(why.clone()).or_default();
-                own.insert((*axis, *place), *before);
+                let values = left.entry(why.clone()).or_default();
+                values.insert((*axis, *place), *before);
             }
             denied.is_none()
         });
@@ -458,7 +459,8 @@ fn values_back(
                     Place::Eeprom(cell) => bus.write_eeprom(*axis, *cell, before.to_be_bytes()[1]),
                     _ => {
                         let commands = place.commands(*before).into_iter();
-                        bus.run_commands(commands.map(|own| (*axis, own))).map(drop)
+                        let commands = commands.map(|command| (*axis, command));
+                        bus.run_commands(commands).map(drop)
                     }
                 })
         });
@@ -483,17 +485,18 @@ fn latched(bus: &OpenRings<'_>, axes: &[Axis]) -> Result<BTreeMap<Axis, (u16, bo
     });
     let words = bus.read_many(cells)?;
     let drives = axes.iter().zip(words.chunks_exact(2));
-    let in_error = drives.filter(|(_, own)| own[0] & u16::from(status::ERROR) != 0);
-    let blocked = |own: &[u16]| own[0] & u16::from(status::BLOCK) != 0;
+    let in_error = drives.filter(|(_, words)| words[0] & u16::from(status::ERROR) != 0);
+    let blocked = |words: &[u16]| words[0] & u16::from(status::BLOCK) != 0;
     Ok(in_error
-        .map(|(axis, own)| (*axis, (own[1], blocked(own))))
+        .map(|(axis, words)| (*axis, (words[1], blocked(words))))
         .collect())
 }
 
 /// The drives that are in an error which is not of the bus.
 fn errors(bus: &OpenRings<'_>, axes: &[Axis]) -> Result<BTreeMap<Axis, u16>, Error> {
-    let all = latched(bus, axes)?.into_iter().map(|own| (own.0, own.1.0));
-    Ok(all.filter(|own| !is_of_the_bus(own.1)).collect())
+    let latched = latched(bus, axes)?.into_iter();
+    let all = latched.map(|(axis, (code, _))| (axis, code));
+    Ok(all.filter(|(_, code)| !is_of_the_bus(*code)).collect())
 }
 
 /// Confirms errors that were not there before, on drives that the software block holds: an error blocks too (11.8, 14.10.1). Those of the bus
@@ -507,13 +510,13 @@ fn errors_back(
     let axes: Vec<_> = rings
         .iter()
         .enumerate()
-        .flat_map(|(ring, size)| (0..size.drives()).filter_map(move |own| Axis::new(ring, own)))
+        .flat_map(|(ring, size)| (0..size.drives()).filter_map(move |drive| Axis::new(ring, drive)))
         .collect();
     let mut left = BTreeMap::new();
     for turn in 0..=TRIES {
         if let Ok(now) = with_bus(link, rings, |bus| latched(bus, &axes)) {
             left = now;
-            left.retain(|axis, own| own.1 && before.get(axis) != Some(&own.0));
+            left.retain(|axis, (code, blocked)| *blocked && before.get(axis) != Some(code));
         }
         let confirm = Command::WriteByte {
             address: ram::ERRORCODE,
@@ -525,15 +528,16 @@ fn errors_back(
             let bytes = bytes.unwrap_or_default();
             link.denied(axis.ring(), Out::Octets(&bytes)).is_none()
         };
-        let own: Vec<_> = left.keys().filter(permitted).copied().collect();
-        if own.is_empty() || turn == TRIES {
+        let axes: Vec<_> = left.keys().filter(permitted).copied().collect();
+        if axes.is_empty() || turn == TRIES {
             break;
         }
-        let confirm = |bus: &OpenRings<'_>| own.iter().try_for_each(|axis| bus.delete_error(*axis));
+        let confirm =
+            |bus: &OpenRings<'_>| axes.iter().try_for_each(|axis| bus.delete_error(*axis));
         // Where it fails, the drives still show their errors.
         let _tried = with_bus(link, rings, confirm);
     }
-    left.retain(|_, own| !is_of_the_bus(own.0));
+    left.retain(|_, (code, _)| !is_of_the_bus(*code));
     let sentence = |(axis, (code, _)): (&Axis, &(u16, bool))| {
         format!(
             "drive {axis}: error {code:04X} was not there before; `drivebench delete-error {axis} --move --rig {origin}` confirms it"

@@ -6,31 +6,35 @@ use harness_bench::rig::file::{Interposer, Transport};
 
 /// The inner links at which the bench can put faults; those at its own ends need none.
 pub(super) fn reached(rig: &Rig) -> Vec<(usize, usize)> {
-    let interposers = rig.file.interposer.iter();
-    links(rig, interposers.map(|own| (own.ring, own.link)))
+    links(rig, rig.file.interposer.iter().map(at))
 }
 
 /// Those of them on which no byte can get a wrong parity bit: with an interposer that has one serial port for both directions.
 pub(super) fn keeping_parity(rig: &Rig) -> Vec<(usize, usize)> {
-    let one = |own: &&Interposer| {
-        own.upstream == own.downstream && own.upstream.transport == Transport::Serial
+    let one = |interposer: &&Interposer| {
+        let port = &interposer.upstream;
+        *port == interposer.downstream && port.transport == Transport::Serial
     };
-    let interposers = rig.file.interposer.iter().filter(one);
+    let interposers = rig.file.interposer.iter().filter(one).map(at);
     interposers
-        .map(|own| place(rig, own.ring, own.link))
+        .map(|(ring, link)| place(rig, ring, link))
         .collect()
 }
 
 /// The links on which bytes were seen: by ring and place.
 pub(super) fn heard(rig: &Rig) -> Vec<(usize, usize)> {
-    let interposers = rig.file.interposer.iter().map(|own| (own.ring, own.link));
-    let taps = rig.file.tap.iter().map(|own| (own.ring, own.link));
-    links(rig, interposers.chain(taps))
+    let taps = rig.file.tap.iter().map(|tap| (tap.ring, tap.link));
+    links(rig, rig.file.interposer.iter().map(at).chain(taps))
 }
 
 /// The number of drives of a ring, counted from 0.
 fn drives(rig: &Rig, ring: usize) -> u8 {
     rig.sizes().get(ring).copied().unwrap_or(0)
+}
+
+/// The number of its ring, and its link.
+const fn at(interposer: &Interposer) -> (u8, LinkName) {
+    (interposer.ring, interposer.link)
 }
 
 /// The ring and the place of a link between drives.

@@ -195,9 +195,9 @@ impl<'s> Run<'s> {
         plan: &Plan,
         sink: Option<&mut dyn Sink>,
     ) -> Result<Attempt, SessionError> {
-        let mut own = plan.clone();
-        own.master = self.master.or(plan.master);
-        let plan = &own;
+        let mut plan = plan.clone();
+        plan.master = self.master.or(plan.master);
+        let plan = &plan;
         let mut way = self.way();
         let capabilities = self.capabilities();
         let simulated = self.session.rig().is_simulated();
@@ -280,9 +280,9 @@ impl<'s> Run<'s> {
 
     /// Why a plan is skipped that `lacks` something, or that the guard denies on the model; with all that would let it be played.
     fn denied(&self, plan: &Plan, lacks: Option<Skip>) -> Option<Skip> {
-        let elsewhere = |own: &Unlock| {
+        let elsewhere = |unlock: &Unlock| {
             matches!(
-                own,
+                unlock,
                 Unlock::Simulated | Unlock::Rings(_) | Unlock::SecondRing
             )
         };
@@ -299,7 +299,8 @@ impl<'s> Run<'s> {
             };
             let denied = skip.unwrap_or_else(|| Why::Denied(why).into());
             skip = Some(denied.and(denying.iter().copied().map(Unlock::Limit)));
-            let allowed = denying.iter().fold(limits, |all, own| all.without(*own));
+            let denying = denying.iter();
+            let allowed = denying.fold(limits, |all, limit| all.without(*limit));
             if allowed == limits {
                 break;
             }
@@ -332,8 +333,8 @@ impl<'s> Run<'s> {
             return;
         }
         self.alive();
-        let mut own = plan.clone();
-        own.master = self.master.or(plan.master);
+        let mut plan = plan.clone();
+        plan.master = self.master.or(plan.master);
         let limits = self.session.limits();
         let resets = self.resets(limits);
         // The model's drives are as new.
@@ -344,14 +345,14 @@ impl<'s> Run<'s> {
         let rehearsed = self.rehearsed(limits, |link| {
             let _examined = way.examine(link);
             // Drives that differ from the model may be sent the rest too.
-            let _outcome = play_over_bus(&own, link, AtMismatch::GoOn);
+            let _outcome = play_over_bus(&plan, link, AtMismatch::GoOn);
         });
-        let mut touched = rehearsed.map_or_else(BTreeSet::new, |mut own| own.take_touched());
+        let mut touched = rehearsed.map_or_else(BTreeSet::new, |mut link| link.take_touched());
         for axis in self.session.axes() {
             match resets {
                 true => touched.extend([(axis, Touched::Reset)]),
                 // Later, drives may be in the middle of something.
-                false if !self.played => touched.extend(within(&limits).map(|own| (axis, own))),
+                false if !self.played => touched.extend(within(&limits).map(|part| (axis, part))),
                 false => {}
             }
         }
@@ -466,7 +467,10 @@ pub(crate) fn opening(
     let mut twin = twin(rig, &known(rig)).ok()?;
     let follow = |conversation| twin.follow(conversation, exactness).divergence;
     let divergence = before.iter().find_map(follow);
-    let received: usize = before.iter().map(|own| own.received.len()).sum();
+    let received = before
+        .iter()
+        .map(|conversation| conversation.received.len());
+    let received: usize = received.sum();
     Some(match divergence {
         None => format!("{} as of a ring at rest", counted(received, "byte")),
         Some(divergence) => format!("{}; {divergence}", counted(received, "byte")),
@@ -534,8 +538,9 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
 /// Whether a scenario has failed because nothing more came.
 fn ends_in_silence(outcome: &Outcome) -> bool {
     let finding = outcome.finding.as_ref();
-    let silent = |own: &Mismatch| {
-        own.difference
+    let silent = |mismatch: &Mismatch| {
+        mismatch
+            .difference
             .as_ref()
             .is_none_or(ByteDifference::is_absence)
     };

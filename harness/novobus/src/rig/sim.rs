@@ -47,18 +47,18 @@ impl RigOfRings for Rig {
             .profile
             .as_ref()
             .map(|profile| profile.lines.as_slice());
-        let own = header(&self.file, profile, &setup(self));
-        plan_header(&self.origin, &own.and(more), &sizes(&self.file))
+        let header = header(&self.file, profile, &setup(self));
+        plan_header(&self.origin, &header.and(more), &sizes(&self.file))
     }
 }
 
 /// Whether a rig is simulated and its file says no more than how large its rings are and which inputs are connected, and allows everything.
 pub(crate) fn is_bare(rig: &Rig) -> bool {
     let file = &rig.file;
-    let is_input = |own: &Setup| match &own.what {
-        SetupKind::Influence(Influence::Stimuli(all)) => {
-            all.iter().all(|own| matches!(own, Stimulus::Input(..)))
-        }
+    let is_input = |setup: &Setup| match &setup.what {
+        SetupKind::Influence(Influence::Stimuli(all)) => all
+            .iter()
+            .all(|stimulus| matches!(stimulus, Stimulus::Input(..))),
         _ => false,
     };
     let limits = limits(rig, true);
@@ -72,7 +72,7 @@ pub(crate) fn is_bare(rig: &Rig) -> bool {
         && file.power.is_empty()
         && file.hooks == Hooks::default()
         && rig.profile.is_none()
-        && setup(rig).only(|own| !is_input(own)).is_empty()
+        && setup(rig).only(|setup| !is_input(setup)).is_empty()
 }
 
 /// How many drives each ring of a rig has.
@@ -98,11 +98,11 @@ pub(crate) fn read<'l>(lines: impl Iterator<Item = &'l String>) -> Header {
 }
 
 /// What the drives of a rig are: the types of its devices, its profile, and the lines of its `[sim]`.
-fn header(file: &RigFile, profile: Option<&[String]>, own: &Header) -> Header {
+fn header(file: &RigFile, profile: Option<&[String]>, simulated: &Header) -> Header {
     let types: Header = file.drive.iter().filter_map(device).collect();
     let profile = profile.map(|lines| read(lines.iter()));
     let known = profile.map_or_else(|| types.clone(), |profile| types.and(&profile));
-    known.and(own).nd21_by_default(sizes(file).len())
+    known.and(simulated).nd21_by_default(sizes(file).len())
 }
 
 /// What the files of rigs ask of rings.
@@ -120,27 +120,29 @@ impl ProfileSetup for Header {
 
 /// What makes no drives of a rig: a line of `[sim]`, or one of the profile.
 fn mistakes(file: &RigFile, profile: Option<&[String]>, lines: &Source) -> RingMistakes {
-    let own = match parse_lines(lines) {
-        Ok(own) => own,
+    let simulated = match parse_lines(lines) {
+        Ok(simulated) => simulated,
         Err(problems) => {
             let all = problems.all().iter();
-            return all.map(|own| (Some(own.span), own.clone())).collect();
+            let all = all.map(|problem| (Some(problem.span), problem.clone()));
+            return all.collect();
         }
     };
-    if let Some(problem) = for_other_rings(&own, &sizes(file)) {
+    if let Some(problem) = for_other_rings(&simulated, &sizes(file)) {
         return vec![(Some(problem.span), problem)];
     }
-    let whole = header(file, profile, &own);
+    let whole = header(file, profile, &simulated);
     let Err(problems) = plan_header(&lines.name, &whole, &sizes(file)) else {
         return Vec::new();
     };
     // The lines about drives stand in front of that about the master, and those of `[sim]` behind all others.
     let written = whole.lines();
-    let first = written.len() - usize::from(whole.master.is_some()) - own.setups.len();
+    let first = written.len() - usize::from(whole.master.is_some()) - simulated.setups.len();
     let text = written.join("\n");
     let placed = problems.all().iter().map(|problem| {
         let line = line_number(&text, problem.span.start) - 1;
-        let setup = line.checked_sub(first).and_then(|at| own.setups.get(at));
+        let place = line.checked_sub(first);
+        let setup = place.and_then(|place| simulated.setups.get(place));
         (setup.map(|setup| setup.span), problem.clone())
     });
     placed.collect()

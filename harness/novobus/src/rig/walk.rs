@@ -107,7 +107,7 @@ impl Walks {
         let sources = self
             .walks
             .iter()
-            .flat_map(|own| own.conversations(PREFIX, |lines| text(self.drives, lines)));
+            .flat_map(|walk| walk.conversations(PREFIX, |lines| text(self.drives, lines)));
         let entries = sources.map(|source| RingScenario::new(source, Some(self.drives)));
         entries.filter_map(Result::ok).collect()
     }
@@ -128,7 +128,7 @@ impl Walks {
         let attempts: Vec<_> = attempts.collect();
         let names = INPUTS.map(|(name, _)| name);
         let told = self.walks.iter();
-        told.map(|own| own.told(&names, PREFIX, &attempts))
+        told.map(|walk| walk.told(&names, PREFIX, &attempts))
             .collect()
     }
 }
@@ -196,8 +196,8 @@ fn permitted(
     }
     let mut walk = walk(&model, INPUTS.len(), bounds, before);
     for part in &mut walk.parts {
-        let own = std::mem::take(&mut part.lines);
-        part.lines = [head.clone(), own, last.clone()].concat();
+        let lines = std::mem::take(&mut part.lines);
+        part.lines = [head.clone(), lines, last.clone()].concat();
     }
     walk
 }
@@ -226,7 +226,7 @@ fn text(drives: u8, lines: &[String]) -> String {
         }
         let bytes = line
             .strip_prefix("> ")
-            .map_or(usize::MAX, |own| own.split(' ').count());
+            .map_or(usize::MAX, |bytes| bytes.split(' ').count());
         room = room.saturating_sub(bytes);
     }
     text.push('\n');

@@ -86,7 +86,8 @@ pub(crate) fn try_wrong_parity(
     let mut heard = Vec::new();
     while heard.len() < SENT.len() && link.now() < end && link.trouble().is_none() {
         wait_keeping(link, end);
-        heard.extend(std::iter::from_fn(|| link.receive_octet(ring)).map(|(_, own)| own.byte));
+        let received = std::iter::from_fn(|| link.receive_octet(ring));
+        heard.extend(received.map(|(_, received)| received.byte));
     }
     session.health()?;
     let found = noticed(&heard);
@@ -113,8 +114,12 @@ pub(crate) fn obstacles(session: &mut Session) -> Result<Vec<String>, SessionErr
     let mut all = Vec::new();
     for ring in 0..session.rings().len() {
         let found = try_wrong_parity(session, ring)?;
-        let port = session.ports().map(|own| own.port_name(ring).to_owned());
-        all.extend(found.zip(port).and_then(|(own, port)| own.obstacle(&port)));
+        let ports = session.ports();
+        let port = ports.map(|ports| ports.port_name(ring).to_owned());
+        let obstacle = found
+            .zip(port)
+            .and_then(|(found, port)| found.obstacle(&port));
+        all.extend(obstacle);
     }
     Ok(all)
 }

@@ -141,7 +141,7 @@ pub const fn outputs_of_the_bus(hardware: u8, hardware2: u8) -> u8 {
 /// stands there once.
 #[must_use]
 pub fn is_own(address: u16) -> bool {
-    OWN.iter().any(|own| own.cells.contains(&address))
+    OWN.iter().any(|range| range.cells.contains(&address))
         || cell_at(address).is_some_and(|cell| cell.access != Access::Write)
 }
 

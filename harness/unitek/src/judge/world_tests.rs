@@ -133,8 +133,8 @@ fn is_found(deviation: &str, all: &[Source]) -> bool {
 fn wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
     let names = DEVIATIONS.all().map(|deviation| deviation.name);
-    let names = names.filter(|own| !NOT_FOUND.contains(own)).step_by(4);
-    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    let names = names.filter(|name| !NOT_FOUND.contains(name)).step_by(4);
+    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
     assert_eq!(missed, [""; 0]);
 }
 
@@ -143,7 +143,7 @@ fn wrong_drives_are_found_by_what_they_send() {
 fn which_wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
     let names = DEVIATIONS.all().map(|deviation| deviation.name);
-    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
     assert_eq!(missed, NOT_FOUND);
 }
 

@@ -114,12 +114,12 @@ pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &RingSetup) -> CaseSco
 pub(crate) fn scope(run: &mut Run<'_>) -> CaseScope {
     let capabilities = run.capabilities();
     let session = run.session();
-    let own = session.limits();
-    let limits = match own.reset && own.motion {
-        true => own,
+    let allowed = session.limits();
+    let limits = match allowed.reset && allowed.motion {
+        true => allowed,
         false => Limits {
-            bytes_per_second: own.bytes_per_second,
-            most_bytes: own.most_bytes,
+            bytes_per_second: allowed.bytes_per_second,
+            most_bytes: allowed.most_bytes,
             ..Limits::default()
         },
     };
@@ -135,8 +135,8 @@ pub(crate) fn scope(run: &mut Run<'_>) -> CaseScope {
             link.reaches(ring, place) && link.damages_parity(ring, place)
         }
     });
-    let own = |ring: &RingScope| !ring.links.is_empty();
-    let reached = own(&first) || second.as_ref().is_some_and(own);
+    let reaches = |ring: &RingScope| !ring.links.is_empty();
+    let reached = reaches(&first) || second.as_ref().is_some_and(reaches);
     let possible = |spice: &Spice| match spice {
         Spice::Power => false,
         Spice::Flip | Spice::Framing => has(Capability::LineErrors) && reached,

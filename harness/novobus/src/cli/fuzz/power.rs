@@ -122,11 +122,11 @@ pub(super) fn power(
     let filter = arguments.filter.as_deref().unwrap_or_default();
     let wanted: Vec<_> = DEVIATIONS
         .all()
-        .filter(|own| own.name.contains(filter))
+        .filter(|deviation| deviation.name.contains(filter))
         .collect();
     let masters: Vec<_> = MASTER_DEVIATIONS
         .all()
-        .filter(|own| own.name.contains(filter) && !arguments.whole)
+        .filter(|deviation| deviation.name.contains(filter) && !arguments.whole)
         .collect();
     if wanted.is_empty() && masters.is_empty() {
         output

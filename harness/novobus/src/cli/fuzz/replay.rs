@@ -86,8 +86,9 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
     let places: Vec<_> = std::iter::once(first).chain(second).collect();
     if folder.join(RECORD).exists() {
         let placed = kept::<Case>(folder)?.into_iter().flat_map(|case| {
-            let fit = places.iter().filter(move |own| own.drives == case.drives);
-            fit.map(move |own| own.case(case.acts.clone()))
+            let places = places.iter();
+            let fit = places.filter(move |place| place.drives == case.drives);
+            fit.map(move |place| place.case(case.acts.clone()))
         });
         return Ok(placed.take(MOST_CASES).collect());
     }
@@ -109,7 +110,7 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
     let mut cases = Vec::new();
     for path in &files {
         let acts = of_hex(path)?;
-        cases.extend(places.iter().map(|own| own.case(acts.clone())));
+        cases.extend(places.iter().map(|place| place.case(acts.clone())));
     }
     Ok(cases)
 }

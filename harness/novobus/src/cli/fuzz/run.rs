@@ -26,7 +26,7 @@ pub(super) fn run(
         Ok(before) => before.map(|(kept, _)| kept),
         Err(error) => return Ok(tell(&error, output)),
     };
-    let others = |own: &&Planted| planted_setup(own).is_none();
+    let others = |planted: &&Planted| planted_setup(planted).is_none();
     if let Some(planted) = arguments.deviates.iter().find(others) {
         output.complain(&format!(
             "drives on a ring have no deviation `{}`; `drivebench deviations` lists them",
@@ -44,9 +44,9 @@ pub(super) fn run(
     let mut rig = rig.clone();
     if rig.is_simulated() {
         let planted = arguments.deviates.iter().filter_map(planted_setup);
-        let mut own = sim::setup(&rig);
-        own.setups.extend(planted);
-        sim::set_up(&mut rig, &own);
+        let mut setup = sim::setup(&rig);
+        setup.setups.extend(planted);
+        sim::set_up(&mut rig, &setup);
     } else if !arguments.deviates.is_empty() || arguments.whole {
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);
@@ -76,8 +76,8 @@ fn on_simulated(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     for planted in &arguments.deviates {
-        let own = rig.rings().nth(planted.ring);
-        let drives = own.map_or(0, |(_, ring)| ring.drives);
+        let ring = rig.rings().nth(planted.ring);
+        let drives = ring.map_or(0, |(_, ring)| ring.drives);
         if planted.drive >= drives {
             output.complain(&match drives {
                 0 => "the rig has one ring, and no ring 2".to_owned(),
@@ -95,13 +95,13 @@ fn on_simulated(
         Some(kept) => kept.about.setup.clone(),
         None => RingSetup::of_rig(rig, &arguments.deviates, arguments.whole),
     };
-    let own = &rig.file.limits;
+    let permitted = &rig.file.limits;
     let limits = Limits {
-        motion: own.allow_motion,
-        eeprom: own.allow_eeprom,
-        reset: own.allow_reset,
-        outputs: own.allow_outputs,
-        monitoring: own.allow_monitoring,
+        motion: permitted.allow_motion,
+        eeprom: permitted.allow_eeprom,
+        reset: permitted.allow_reset,
+        outputs: permitted.allow_outputs,
+        monitoring: permitted.allow_monitoring,
         ..Limits::default()
     };
     let scope = simulated(rig, limits, &setup);

@@ -95,8 +95,8 @@ fn on_simulated(subject: &Subject) -> Result<Option<Difference>, ExploreError> {
 /// cost nothing. What comes of it is only a proposal; the rig decides.
 fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
     let drives = 0..finding.case.drives;
-    let own = finding.difference.drive;
-    let suspects: Vec<u8> = own.map_or_else(|| drives.collect(), |drive| vec![drive]);
+    let accused = finding.difference.drive;
+    let suspects: Vec<u8> = accused.map_or_else(|| drives.collect(), |drive| vec![drive]);
     for deviation in DEVIATIONS.all() {
         for drive in &suspects {
             let name = deviation.name.to_owned();

@@ -97,7 +97,7 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
     };
     said.extend(watched.failed);
     said.iter()
-        .map(|own| format!("seed {seed}: {own}"))
+        .map(|line| format!("seed {seed}: {line}"))
         .collect()
 }
 
@@ -159,7 +159,7 @@ fn found(drives: &str, (seed, one_in): (u64, u64), cases: u64) -> Vec<String> {
     found
         .0
         .iter()
-        .map(|own| format!("seed {seed}: {own}"))
+        .map(|finding| format!("seed {seed}: {finding}"))
         .collect()
 }
 
@@ -181,7 +181,7 @@ fn by_hand() {
     let text = std::env::var("BUSY").unwrap_or_else(|_| "60,1,3,1,0".to_owned());
     let numbers: Vec<u64> = text
         .split(',')
-        .map(|own| own.parse().expect("a number"))
+        .map(|number| number.parse().expect("a number"))
         .collect();
     let [one_in, first, last, drives, cases] = numbers[..] else {
         panic!("five numbers")
@@ -198,9 +198,9 @@ fn by_hand() {
 /// What two parts of a qualification come to whose drives are set up like this, on a computer that is never late.
 fn of_parts(drives: [&str; 2]) -> Qualified {
     let rig = rig("");
-    let sessions = drives.map(|own| session(&rig, own, Stalls::new(1, 0)));
-    let [mut one, mut other] = sessions.map(|own| own.expect("a ring that opens"));
-    let mut runs = [&mut one, &mut other].map(|own| Run::new(own).expect("a run"));
+    let sessions = drives.map(|setup| session(&rig, setup, Stalls::new(1, 0)));
+    let [mut one, mut other] = sessions.map(|session| session.expect("a ring that opens"));
+    let mut runs = [&mut one, &mut other].map(|session| Run::new(session).expect("a run"));
     runs.iter_mut().for_each(Run::repeat);
     let [one, other] = &mut runs;
     let facts = QualificationFacts::of(one);

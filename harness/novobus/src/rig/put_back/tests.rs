@@ -27,7 +27,7 @@ fn all(session: &mut Session) -> Values {
     let axes = session.axes();
     let all = axes
         .into_iter()
-        .flat_map(|axis| places.iter().map(move |own| (axis, *own)));
+        .flat_map(|axis| places.iter().map(move |place| (axis, *place)));
     let (all, rings) = (all.collect(), session.rings().to_vec());
     with_bus(session.link(), &rings, |bus| read(bus, &all)).expect("drives that answer")
 }

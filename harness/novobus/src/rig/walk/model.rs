@@ -203,9 +203,9 @@ impl RightRing {
     fn stands_as(&self, other: &Self) -> bool {
         let pairs = self.drives.iter().zip(&other.drives);
         pairs
-            .map(|(own, other)| (own.bus_end(), other.bus_end()))
-            .all(|(own, other)| {
-                own.place() == other.place() && own.error_mode() == other.error_mode()
+            .map(|(drive, other)| (drive.bus_end(), other.bus_end()))
+            .all(|(drive, other)| {
+                drive.place() == other.place() && drive.error_mode() == other.error_mode()
             })
     }
 }
@@ -278,7 +278,7 @@ impl Model {
     /// How many net bytes of a telegram are still to come.
     fn left(&self) -> u8 {
         let left = self.walked().bus_end().remaining();
-        left.map_or(0, |own| own.net_bytes)
+        left.map_or(0, |remaining| remaining.net_bytes)
     }
 
     /// Whether it leads to what other ways lead to as well: a command is cut behind its first byte alone, and what follows it in a telegram is
@@ -310,8 +310,8 @@ impl Model {
 
     /// The command that writes, of which the drive waits for the checking byte.
     fn writes(&self) -> Option<Kind> {
-        let own = self.parameter().filter(|own| own.field == Field::Check)?;
-        (!own.kind.reads() && own.kind != Kind::ResetH8).then_some(own.kind)
+        let Parameter { kind, field, .. } = self.parameter()?;
+        (field == Field::Check && !kind.reads() && kind != Kind::ResetH8).then_some(kind)
     }
 
     /// The drive's address byte, as the master sends it.
@@ -327,7 +327,7 @@ impl Model {
             drive.receive(self.now, byte).byte.map(Received::good)
         });
         let drive = self.walked();
-        arrives.map(|own| classify(drive.bus_end(), drive.memory(), own).event)
+        arrives.map(|received| classify(drive.bus_end(), drive.memory(), received).event)
     }
 
     /// The byte that is an event, the one at a place where several are.
@@ -363,9 +363,9 @@ impl Model {
 
     /// The byte of a command.
     fn of_command(&self, event: Event, at: usize) -> Option<u8> {
-        let own = self.parameter()?;
-        let accepted = accepted(&own, |address| self.walked().memory().peek(address));
-        match (event, own.field) {
+        let parameter = self.parameter()?;
+        let accepted = accepted(&parameter, |address| self.walked().memory().peek(address));
+        match (event, parameter.field) {
             (Event::Accepted | Event::RightCheck, _) => Some(accepted),
             (Event::WrongCheck, _) => [0x01, 0x10, 0x80].get(at).map(|bit| accepted ^ bit),
             (_, Field::AddrH) => Some(0x12),
@@ -383,7 +383,7 @@ impl Model {
         let addressed = others.map(|(_, drive)| drive.bus_end().place());
         let mut byte = addressed.filter_map(|place| match place {
             Place::Command => Some(0xC0),
-            Place::Parameter(own) => Some(accepted(&own, |_| 0)),
+            Place::Parameter(parameter) => Some(accepted(&parameter, |_| 0)),
             _ => None,
         });
         byte.next_back().unwrap_or(0x55)
@@ -410,8 +410,8 @@ impl Model {
             let answers: Vec<_> = answers.collect();
             let mut others = self.rings.iter().zip(&answers);
             let first = others.next();
-            let open = others.find(|(ring, answer)| {
-                first.is_some_and(|(own, byte)| byte != *answer || !own.stands_as(ring))
+            let open = others.find(|(other, answer)| {
+                first.is_some_and(|(ring, byte)| byte != *answer || !ring.stands_as(other))
             });
             if let Some((ring, _)) = open {
                 return Err(format!("the manual leaves `{}` open", ring.open));
@@ -440,8 +440,8 @@ impl Model {
         let mut lines = Vec::new();
         while self.walked().bus_end().command_begun() && !self.walked().in_error() {
             let line = match self.parameter() {
-                Some(own) => {
-                    let byte = accepted(&own, |_| 0);
+                Some(parameter) => {
+                    let byte = accepted(&parameter, |_| 0);
                     self.send(&[byte], false)?
                 }
                 None => self.send(&[0x80 | LONGEST << 1, self.own_address()], false)?,
@@ -470,7 +470,7 @@ impl Model {
 fn admit(guard: &mut Guard, now: Instant, byte: u8) -> Result<(), String> {
     guard.admit(now, byte, false).map_err(|denial| {
         let missing = guard.limits().denying(denial.cause);
-        let missing: Vec<_> = missing.map(|own| own.to_string()).collect();
+        let missing: Vec<_> = missing.map(|setting| setting.to_string()).collect();
         match missing.is_empty() {
             true => denial.to_string(),
             false => format!("needs {}", missing.join(", ")),
@@ -479,13 +479,13 @@ fn admit(guard: &mut Guard, now: Instant, byte: u8) -> Result<(), String> {
 }
 
 /// The byte that a drive accepts here: addresses of the cells that are tried, data that differ from what they hold, and the right checking byte.
-fn accepted(own: &Parameter, holds: impl Fn(u16) -> u8) -> u8 {
-    match own.field {
+fn accepted(parameter: &Parameter, holds: impl Fn(u16) -> u8) -> u8 {
+    match parameter.field {
         Field::AddrL => WORD as u8,
         Field::AddrH => (WORD >> 8) as u8,
         Field::AddrInPage => BITS as u8,
-        Field::Data(_) if own.kind == Kind::And => 0x5A,
-        Field::Data(_) if own.kind == Kind::Or => 0x1B,
+        Field::Data(_) if parameter.kind == Kind::And => 0x5A,
+        Field::Data(_) if parameter.kind == Kind::Or => 0x1B,
         // A zero is an input of its own.
         Field::Data(place) => match !holds(WORD + u16::from(place)) {
             0 => 0x5A,
@@ -493,7 +493,7 @@ fn accepted(own: &Parameter, holds: impl Fn(u16) -> u8) -> u8 {
         },
         Field::Code => 0x01,
         Field::Fixed(byte) => byte,
-        Field::Check => own.command_sum.plus(),
+        Field::Check => parameter.command_sum.plus(),
     }
 }
 
@@ -507,7 +507,9 @@ impl WalkModel for Model {
             || of_matrix == transitions::State::SyncOtherBegun;
         State {
             of_matrix,
-            due: self.parameter().map(|own| (own.kind, own.field)),
+            due: self
+                .parameter()
+                .map(|parameter| (parameter.kind, parameter.field)),
             begun: !drive.in_error() && drive.bus_end().command_begun(),
             left: match self.place() {
                 Place::Passing => 0,
@@ -529,24 +531,25 @@ impl WalkModel for Model {
                 let is_event = byte.is_some_and(|byte| self.is_to_the_drive(byte) == Some(event));
                 is_event && !self.is_more_of_the_same(event, at)
             }
-            Border(address) => self.parameter().is_some_and(|own| {
-                let refused = !self.walked().memory().permits(own.kind, address);
-                own.field == Field::AddrL && left > 3 && (own.kind.reads() || refused)
+            Border(address) => self.parameter().is_some_and(|parameter| {
+                let refused = !self.walked().memory().permits(parameter.kind, address);
+                parameter.field == Field::AddrL && left > 3 && (parameter.kind.reads() || refused)
             }),
             Run(..) => self.walked().in_error() || self.place() == Place::Sync,
             Rest => self.place() == Place::Sync && self.walked().bus_end().command_begun(),
             Silence => self
                 .parameter()
-                .is_none_or(|own| own.kind == Kind::WriteWord),
+                .is_none_or(|parameter| parameter.kind == Kind::WriteWord),
         }
     }
 
     fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
         let writes = self.writes();
-        let own = self.parameter();
+        let parameter = self.parameter();
         let between = self.place() == Place::Sync;
-        let is = |field| own.is_some_and(|own| own.field == field);
-        let resets = own.is_some_and(|own| own.kind == Kind::ResetH8) && is(Field::Check);
+        let is = |field| parameter.is_some_and(|parameter| parameter.field == field);
+        let kind = parameter.map(|parameter| parameter.kind);
+        let resets = kind == Some(Kind::ResetH8) && is(Field::Check);
         let line = match INPUTS[input].1 {
             Silence => {
                 self.now += Span::from_millis(SILENCE);
@@ -563,7 +566,7 @@ impl WalkModel for Model {
                     .walked()
                     .bus_end()
                     .remaining()
-                    .is_some_and(|own| own.process_data) =>
+                    .is_some_and(|remaining| remaining.process_data) =>
             {
                 return Err("as process data are not sent to other drives".to_owned());
             }
@@ -589,7 +592,7 @@ impl WalkModel for Model {
                 self.send(&[byte], false)?
             }
             Border(address) => {
-                let whole = match own.map(|own| own.kind) {
+                let whole = match kind {
                     Some(Kind::ReadByte) => Command::ReadByte { address }.encode(),
                     Some(Kind::ReadWord) => Command::ReadWord { address }.encode(),
                     _ => Vec::new(),

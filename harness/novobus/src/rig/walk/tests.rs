@@ -30,7 +30,7 @@ fn all() -> Walks {
 fn told(limits: &Limits) -> String {
     let walks = Walks::within(DRIVES, limits);
     let played = walks.conversations().into_iter();
-    let played = played.map(|own| (own.short_name().to_owned(), Verdict::Passed));
+    let played = played.map(|scenario| (scenario.short_name().to_owned(), Verdict::Passed));
     walks.told(&played.collect::<Vec<_>>())
 }
 
@@ -61,7 +61,7 @@ fn differing(walks: &Walks, model: &str, lines: &str) -> Option<String> {
         let mut twin = Twin::new(bench(&right), &right.rings);
         let (comparisons, _) = twin.follow_all(&conversations, THROUGH_A_PORT);
         let mut found = comparisons.into_iter();
-        let found = found.find_map(|own| own.divergence)?;
+        let found = found.find_map(|comparison| comparison.divergence)?;
         Some(format!("{}: {found}", entry.short_name()))
     })
 }
@@ -144,7 +144,7 @@ fn the_first_conversations_need_no_motion() {
 fn the_conversations_are_those_of_the_limits() {
     let texts = |walks: Walks| -> Vec<_> {
         let all = walks.conversations().into_iter();
-        all.map(|own| own.source.text.to_string()).collect()
+        all.map(|entry| entry.source.text.to_string()).collect()
     };
     assert_eq!(texts(all()), texts(all()));
     let took = all().conversations().into_iter().map(|entry| {
@@ -160,7 +160,7 @@ fn the_conversations_are_those_of_the_limits() {
 fn rings_of_any_size_have_conversations_without_mistakes() {
     for drives in [1, 2, 5] {
         let walks = Walks::within(drives, &Limits::unlimited());
-        let parts: usize = walks.walks.iter().map(|own| own.walk.parts.len()).sum();
+        let parts: usize = walks.walks.iter().map(|walk| walk.walk.parts.len()).sum();
         assert_eq!(walks.conversations().len(), parts, "{drives}");
     }
     let large = Walks::within(SMALL + 1, &Limits::unlimited());
@@ -194,7 +194,8 @@ fn wrong_drives_that_the_walk_finds() {
         let of_the_bus = DEVIATIONS
             .all()
             .filter(|deviation| !deviation.is_behind_the_bus());
-        of_the_bus.filter(|own| finds(&walks, drive, own)).count()
+        let found = of_the_bus.filter(|deviation| finds(&walks, drive, deviation));
+        found.count()
     };
     assert_eq!(
         (found(2), found(1), DEVIATIONS.all().count()),
@@ -218,7 +219,7 @@ fn right_drives_with_all_values_at_once_are_not_accused() {
     let walks = all();
     assert_eq!(differing(&walks, PLAIN, ""), None);
     let lines: Vec<_> = settings();
-    let lines = lines.iter().map(|own| format!("drive 0..last {own}"));
+    let lines = lines.iter().map(|line| format!("drive 0..last {line}"));
     let lines = lines.collect::<Vec<_>>().join("\n");
     assert_eq!(differing(&walks, PLAIN, &lines), None);
 }
