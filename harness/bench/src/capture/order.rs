@@ -74,7 +74,7 @@ pub(super) fn ordered(
         return all;
     };
     let frames = sections(frames.clone(), *first);
-    let mut clock = Clock::default();
+    let mut clock = FileClock::default();
     for (index, frame) in frames.into_iter().enumerate() {
         if let Some(kind) = clock.next(&frame, counts, length(&frame).as_nanos()) {
             all.seams.push(Seam { piece: index, kind });
@@ -115,7 +115,7 @@ fn sections(mut frames: Vec<FrameRead>, first: FrameRead) -> Vec<FrameRead> {
 
 /// The clock of a file.
 #[derive(Debug, Default)]
-struct Clock {
+struct FileClock {
     before: Option<Place>,
     /// The time of the first frame since the clock was last set.
     first: u64,
@@ -131,7 +131,7 @@ struct Clock {
     recordings: Vec<Place>,
 }
 
-impl Clock {
+impl FileClock {
     /// Advances to a frame. Returns what separates it from the one before, where times are not continuous.
     fn next(&mut self, frame: &FrameRead, counts: Counts, length: u64) -> Option<SeamKind> {
         let nanos = i128::from(frame.nanos);

@@ -1,6 +1,6 @@
 //! Captures in pcap, the format before pcapng: one interface without a name, times in microseconds or nanoseconds.
 
-use super::pcapng::{LINK_TYPES, Packet, Reader, finish, nanoseconds};
+use super::pcapng::{LINK_TYPES, Packet, PcapngReader, finish, nanoseconds};
 use super::{CaptureError, Imported, NamedLink};
 use crate::report::pcapng::NANOSECONDS;
 use harness_proto::line::Rate;
@@ -35,7 +35,7 @@ pub(super) fn read(
     rate: Option<Rate>,
     links: &[NamedLink],
 ) -> Result<Imported, CaptureError> {
-    let mut reader = Reader::new(bytes, links);
+    let mut reader = PcapngReader::new(bytes, links);
     let Some((big, resolution)) = kind(bytes) else {
         return reader.wrong(0, "no magic number of pcap is here");
     };

@@ -32,7 +32,7 @@ use harness_proto::can::BitRate;
 use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
 use interfaces::{Interface, Role};
-use parts::{Part, chosen};
+use parts::{InterfaceGroup, chosen};
 use statistics::{STATISTICS, listened_to};
 use std::collections::BTreeMap;
 use values::{means_loss, noted};
@@ -73,7 +73,7 @@ pub fn read(
     rate: Option<Rate>,
     links: &[NamedLink],
 ) -> Result<Imported, CaptureError> {
-    let mut reader = Reader::new(bytes, links);
+    let mut reader = PcapngReader::new(bytes, links);
     let mut offset = 0;
     while offset < bytes.len() {
         offset = reader.block(offset)?;
@@ -82,7 +82,10 @@ pub fn read(
 }
 
 /// The capture of all packets of one part, and what was not read.
-pub(super) fn finish(mut reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError> {
+pub(super) fn finish(
+    mut reader: PcapngReader<'_>,
+    rate: Option<Rate>,
+) -> Result<Imported, CaptureError> {
     reader.no_twins()?;
     reader.cooked_frames()?;
     let events = std::mem::take(&mut reader.events);
@@ -108,7 +111,7 @@ pub(super) fn finish(mut reader: Reader<'_>, rate: Option<Rate>) -> Result<Impor
 }
 
 /// The capture of the part that is wanted.
-fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError> {
+fn part(reader: PcapngReader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError> {
     if reader.parts.is_empty() {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
@@ -134,8 +137,8 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
     let octets = reader.octets.into_iter();
     let octets = octets.filter(|octet| octet.part == wanted);
     match &reader.parts[wanted] {
-        Part::Ring => {}
-        Part::Stations => {
+        InterfaceGroup::Ring => {}
+        InterfaceGroup::Stations => {
             let senders = of_part().filter_map(|interface| match interface.carries {
                 Role::Station(station) => Some(station),
                 Role::Link(..) | Role::Frames(_) | Role::Line => None,
@@ -143,7 +146,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
             let octets = octets.map(|octet| (octet.from, octet.octet)).collect();
             return Ok(telegrams::assemble(senders, octets, octet).into());
         }
-        Part::Line(_) => {
+        InterfaceGroup::Line(_) => {
             let mut octets: Vec<_> = octets.collect();
             octets.sort_by_key(|octet| octet.nanos);
             let octets = in_order(octets.into_iter().map(|octet| octet.octet), octet);
@@ -156,7 +159,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
                 ..capture.into()
             });
         }
-        Part::Senders | Part::Frames(_) => {
+        InterfaceGroup::Senders | InterfaceGroup::Frames(_) => {
             let frames = reader.frames.into_iter();
             let frames = frames.filter_map(|(number, frame)| (number == wanted).then_some(frame));
             return Ok(assemble(frames.collect(), Counts::Packets, reader.bit_rate));
@@ -212,7 +215,7 @@ fn in_order(octets: impl Iterator<Item = PacketOctet>, octet: Span) -> Vec<Packe
     octets.collect()
 }
 
-pub(super) struct Reader<'b> {
+pub(super) struct PcapngReader<'b> {
     pub(super) bytes: &'b [u8],
     /// The section's numbers have the high byte first.
     pub(super) big: bool,
@@ -231,7 +234,7 @@ pub(super) struct Reader<'b> {
     cooked: Vec<CookedFrame>,
     /// Frames with the number of their part.
     frames: Vec<(usize, FrameRead)>,
-    parts: Vec<Part>,
+    parts: Vec<InterfaceGroup>,
     /// What `capture` has noted besides bytes and frames.
     events: Vec<String>,
     /// What the user says of interfaces.
@@ -246,7 +249,7 @@ pub(super) struct Reader<'b> {
     listened: Option<(u64, u64)>,
 }
 
-impl<'b> Reader<'b> {
+impl<'b> PcapngReader<'b> {
     /// A reader that has read nothing yet.
     pub(super) fn new(bytes: &'b [u8], links: &'b [NamedLink]) -> Self {
         Self {
@@ -273,7 +276,7 @@ impl<'b> Reader<'b> {
     }
 
     /// The number of a part.
-    fn part(&mut self, part: Part) -> usize {
+    fn part(&mut self, part: InterfaceGroup) -> usize {
         let known = self.parts.iter().position(|known| *known == part);
         known.unwrap_or_else(|| {
             self.parts.push(part);

@@ -20,7 +20,7 @@ pub(crate) fn span_of<T>(value: &Spanned<T>) -> TextSpan {
 
 /// Compares a document with the schema of such a file, which messages call `whole`.
 pub fn compare(root: &Value, whole: &str, table: &Spanned<DeTable<'_>>) -> Vec<Problem> {
-    let mut walk = Walk {
+    let mut walk = SchemaWalk {
         root,
         whole,
         problems: Vec::new(),
@@ -80,13 +80,13 @@ pub fn syntax(error: &toml::de::Error) -> Problem {
     )
 }
 
-struct Walk<'a> {
+struct SchemaWalk<'a> {
     root: &'a Value,
     whole: &'a str,
     problems: Vec<Problem>,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> SchemaWalk<'a> {
     /// Follows a reference, and the branch that is not null.
     fn resolve(&self, schema: &'a Value) -> &'a Value {
         let mut schema = schema;

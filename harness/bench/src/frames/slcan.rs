@@ -352,13 +352,13 @@ fn write_hex(number: u32, digits: u32, out: &mut Vec<u8>) {
 
 /// Cuts a stream into lines at CR and BEL. LF is dropped: some hosts send CR LF.
 #[derive(Clone, Debug, Default)]
-pub struct Lines {
+pub struct SlcanLines {
     begun: Vec<u8>,
     /// Characters of the line, those that were not kept included.
     length: usize,
 }
 
-impl Lines {
+impl SlcanLines {
     /// Takes a character; gives the line that it ends, and the end.
     ///
     /// # Errors
@@ -527,7 +527,7 @@ mod tests {
 
     #[test]
     fn lines_are_bounded() {
-        let mut lines = Lines::default();
+        let mut lines = SlcanLines::default();
         let mut push =
             |text: &[u8]| -> Vec<_> { text.iter().filter_map(|byte| lines.push(*byte)).collect() };
         assert_eq!(push(b"C\r\nO"), [Ok((b"C".to_vec(), CR))]);

@@ -28,7 +28,7 @@ const ONE_DAY: u64 = 86_400_000;
 pub const OVERDUE: &str = "`max_run` of the rig's file is over";
 
 /// Counts what a link has carried.
-type Counter<L> = fn(&L) -> u64;
+type TrafficCounter<L> = fn(&L) -> u64;
 
 /// A line or a link that sends nothing that the [gates](Gate) of its ports deny. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
@@ -56,7 +56,7 @@ pub struct Guarded<L> {
     /// When the longest run is over that the rig's file allows.
     deadline: Option<std::time::Instant>,
     /// How much the link behind the guard may have carried, and how that is counted; `None` where its record needs no limit.
-    most_carried: Option<(u64, Counter<L>)>,
+    most_carried: Option<(u64, TrafficCounter<L>)>,
 }
 
 impl<L: Line> Guarded<L> {
@@ -472,7 +472,8 @@ impl<L: Link> Guarded<L> {
     /// own.
     pub fn limit_record(&mut self, most: Option<u64>) {
         let now = self.inner.carried();
-        self.most_carried = most.map(|most| (now.saturating_add(most), L::carried as Counter<L>));
+        self.most_carried =
+            most.map(|most| (now.saturating_add(most), L::carried as TrafficCounter<L>));
     }
 }
 

@@ -9,7 +9,7 @@ use super::lateness::Lateness;
 use super::port_end::{Accounting, MOST_RECORDED, PortEnd};
 use super::tamper::Tamper;
 use super::{HARMLESS, Lead, LinkFault, Moment, Trouble};
-use crate::port::{LastWords, Parts, Switch, Wire, wake_on_time};
+use crate::port::{LastWords, Switch, Wire, WireParts, wake_on_time};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use rustix::event::{Timespec, poll};
@@ -323,7 +323,7 @@ impl<A: Accounting> Pump<A> {
     }
 
     /// As [`PortLink::last_words`](super::PortLink::last_words).
-    pub fn last_words(&self, parts: Parts) -> std::io::Result<Vec<LastWords>> {
+    pub fn last_words(&self, parts: WireParts) -> std::io::Result<Vec<LastWords>> {
         let ports = self.ports.iter();
         ports.map(|end| end.wire.last_words(parts)).collect()
     }

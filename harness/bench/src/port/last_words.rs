@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// How pieces are written on a wire: parts that are sent one after another.
-pub type Parts = fn(&Pieces) -> Vec<Vec<u8>>;
+pub type WireParts = fn(&Pieces) -> Vec<Vec<u8>>;
 
 /// A way to a wire with its own descriptor.
 #[derive(Debug)]
 pub struct LastWords {
     fd: OwnedFd,
     name: String,
-    parts: Parts,
+    parts: WireParts,
     /// How the wire codes a byte.
     code: fn(u8) -> Vec<u8>,
     /// How long the wire is idle before each part.
@@ -34,7 +34,7 @@ pub struct LastWordsError {
 
 impl LastWords {
     /// For a descriptor that takes bytes as they are.
-    pub const fn plain(fd: OwnedFd, name: String, parts: Parts) -> Self {
+    pub const fn plain(fd: OwnedFd, name: String, parts: WireParts) -> Self {
         let gap = Duration::ZERO;
         Self {
             fd,

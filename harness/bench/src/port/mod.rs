@@ -25,7 +25,7 @@ pub mod wire;
 pub use harness_uart::Counts;
 pub use holder::OtherProgram;
 pub(crate) use holder::is_exclusive;
-pub use last_words::Parts;
+pub use last_words::WireParts;
 pub use last_words::{LastWords, LastWordsError};
 pub(crate) use open::open_adapter;
 pub use open::{OpenError, PortAddress, PortSettings, open};

@@ -104,7 +104,7 @@ fn settings(format: Format) -> [(&'static str, u8, u32, usize); 5] {
 /// One end of the connection, bytes in and bytes out.
 #[derive(Debug, Default)]
 pub(super) struct Telnet {
-    state: State,
+    state: TelnetState,
     replies: Vec<u8>,
     answers: VecDeque<Vec<u8>>,
     errors: u64,
@@ -113,7 +113,7 @@ pub(super) struct Telnet {
 }
 
 #[derive(Debug, Default)]
-enum State {
+enum TelnetState {
     #[default]
     Data,
     Command,
@@ -151,30 +151,30 @@ impl Telnet {
     pub(super) fn push(&mut self, byte: u8) -> Option<u8> {
         let mut data = None;
         self.state = match (std::mem::take(&mut self.state), byte) {
-            (State::Data, IAC) => State::Command,
-            (State::Data, byte) => {
+            (TelnetState::Data, IAC) => TelnetState::Command,
+            (TelnetState::Data, byte) => {
                 data = Some(byte);
-                State::Data
+                TelnetState::Data
             }
-            (State::Command, IAC) => {
+            (TelnetState::Command, IAC) => {
                 data = Some(IAC);
-                State::Data
+                TelnetState::Data
             }
-            (State::Command, SB) => State::Sub(Vec::new()),
-            (State::Command, verb @ (DO | DONT | WILL | WONT)) => State::Option(verb),
-            (State::Command, _) => State::Data,
-            (State::Option(verb), option) => {
+            (TelnetState::Command, SB) => TelnetState::Sub(Vec::new()),
+            (TelnetState::Command, verb @ (DO | DONT | WILL | WONT)) => TelnetState::Option(verb),
+            (TelnetState::Command, _) => TelnetState::Data,
+            (TelnetState::Option(verb), option) => {
                 self.option(verb, option);
-                State::Data
+                TelnetState::Data
             }
-            (State::Sub(sub), IAC) => State::SubCommand(sub),
-            (State::Sub(sub), byte) => State::Sub(with(sub, byte)),
-            (State::SubCommand(sub), IAC) => State::Sub(with(sub, IAC)),
-            (State::SubCommand(sub), SE) => {
+            (TelnetState::Sub(sub), IAC) => TelnetState::SubCommand(sub),
+            (TelnetState::Sub(sub), byte) => TelnetState::Sub(with(sub, byte)),
+            (TelnetState::SubCommand(sub), IAC) => TelnetState::Sub(with(sub, IAC)),
+            (TelnetState::SubCommand(sub), SE) => {
                 self.answer(sub);
-                State::Data
+                TelnetState::Data
             }
-            (State::SubCommand(_), _) => State::Data,
+            (TelnetState::SubCommand(_), _) => TelnetState::Data,
         };
         data
     }

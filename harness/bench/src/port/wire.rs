@@ -1,6 +1,6 @@
 //! One stream with its coding.
 
-use super::last_words::{LastWords, Parts};
+use super::last_words::{LastWords, WireParts};
 use super::rfc2217::{Telnet, is_telnet};
 use super::serial::{Serial, Switch};
 use crate::counted::counted;
@@ -135,7 +135,7 @@ impl Wire {
     ///
     /// # Errors
     /// No more descriptors are available.
-    pub fn last_words(&self, parts: Parts) -> std::io::Result<LastWords> {
+    pub fn last_words(&self, parts: WireParts) -> std::io::Result<LastWords> {
         let fd = self.fd.try_clone()?;
         let plain = LastWords::plain(fd, self.name.clone(), parts);
         Ok(match &self.coding {

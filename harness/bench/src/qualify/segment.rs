@@ -418,9 +418,9 @@ mod tests {
     use Verdict::{Failed, Inconclusive, Passed};
 
     /// An attempt, whether right drives explain it, and the deviations that do; none where that was not compared.
-    struct Row(AttemptSummary, bool, &'static [&'static str]);
+    struct AttemptRow(AttemptSummary, bool, &'static [&'static str]);
 
-    impl Note for Row {
+    impl Note for AttemptRow {
         type Deviation = str;
 
         fn deviations() -> Vec<&'static str> {
@@ -449,7 +449,7 @@ mod tests {
     }
 
     /// Attempts at scenarios with these names.
-    fn rows(attempts: &[(&str, Verdict, bool, &'static [&'static str])]) -> Vec<Row> {
+    fn rows(attempts: &[(&str, Verdict, bool, &'static [&'static str])]) -> Vec<AttemptRow> {
         let row = |(name, verdict, right, explain): &(&str, Verdict, bool, &'static [_])| {
             let noted = AttemptSummary {
                 name: (*name).to_owned(),
@@ -460,12 +460,12 @@ mod tests {
                 was_ready: true,
                 was_unanswered: false,
             };
-            Row(noted, *right, explain)
+            AttemptRow(noted, *right, explain)
         };
         attempts.iter().map(row).collect()
     }
 
-    fn found(parts: &[Vec<Row>], contradictions: &[&str]) -> (String, Verdict) {
+    fn found(parts: &[Vec<AttemptRow>], contradictions: &[&str]) -> (String, Verdict) {
         let profiled = MergedProfile {
             profile: None,
             contradictions: contradictions.iter().copied().map(str::to_owned).collect(),

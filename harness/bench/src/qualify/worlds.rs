@@ -245,13 +245,13 @@ fn instant(at: i64) -> Instant {
 }
 
 /// The place of a world: number of pieces heard, the drive's clock, and a serial number.
-type Place = (usize, i64, usize);
+type WorldPlace = (usize, i64, usize);
 
 /// Worlds of which no two behave the same, in order of their places. What follows from a world has a later place.
 struct Worlds<M: RightDrive> {
-    all: BTreeMap<Place, World<M>>,
+    all: BTreeMap<WorldPlace, World<M>>,
     /// The places of worlds that behave the same. The place of a world that was taken out stays.
-    same: HashMap<MergeKey<M::Piece>, Vec<Place>>,
+    same: HashMap<MergeKey<M::Piece>, Vec<WorldPlace>>,
     numbers: usize,
 }
 

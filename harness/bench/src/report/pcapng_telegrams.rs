@@ -34,7 +34,7 @@ pub const MOST: usize = 255;
 const NEAR: Span = Span::from_nanos(1);
 
 /// Octets of one station, in order; the slave that sent them, or `None` for the master.
-pub type Sent<'t> = (Option<u8>, &'t [LineByte]);
+pub type SentOctets<'t> = (Option<u8>, &'t [LineByte]);
 
 /// The time of an octet at a rate.
 pub fn octet_time(bits_per_second: u64) -> Option<Span> {
@@ -47,7 +47,7 @@ pub fn octet_time(bits_per_second: u64) -> Option<Span> {
 /// # Errors
 /// Writing fails.
 pub fn write(
-    telegrams: &[Sent<'_>],
+    telegrams: &[SentOctets<'_>],
     bits_per_second: Option<u64>,
     mut out: impl Write,
 ) -> std::io::Result<()> {

@@ -7,7 +7,7 @@ use crate::scenario::problem::Problems;
 use std::error::Error;
 
 /// What the bus of a rig says of it.
-type Finding = Box<dyn Error + Send + Sync>;
+type BoxedError = Box<dyn Error + Send + Sync>;
 
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -73,9 +73,9 @@ pub enum SessionError {
         /// Which ring, 1 or 2.
         ring: usize,
         /// What is wrong.
-        ill: Finding,
+        ill: BoxedError,
         /// The likely cause, and what to do next; only known when a rig is opened.
-        cause: Option<Finding>,
+        cause: Option<BoxedError>,
     },
 }
 

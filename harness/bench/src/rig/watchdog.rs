@@ -18,11 +18,11 @@ use std::time::{Duration, Instant};
 const EVERY: Duration = Duration::from_millis(250);
 
 /// Called with the reason, in a sentence.
-type Act = dyn Fn(&str) + Send + Sync;
+type AlarmHook = dyn Fn(&str) + Send + Sync;
 
 /// Called once the drives have been stopped.
 #[derive(Clone, Default)]
-pub struct Alarm(Option<Arc<Act>>);
+pub struct Alarm(Option<Arc<AlarmHook>>);
 
 impl Alarm {
     /// An alarm that does this.

@@ -18,23 +18,23 @@ pub struct Duration {
     digits: u64,
     /// How many of them follow the point.
     decimals: u32,
-    unit: Unit,
+    unit: DurationUnit,
     span: TextSpan,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Unit {
+enum DurationUnit {
     Time(Span),
     Bytes,
 }
 
-const UNITS: [(&str, Unit); 6] = [
-    ("us", Unit::Time(Span::from_micros(1))),
-    ("ms", Unit::Time(Span::from_millis(1))),
-    ("s", Unit::Time(Span::from_millis(1000))),
-    ("bytes", Unit::Bytes),
-    ("byte", Unit::Bytes),
-    ("ns", Unit::Time(Span::from_nanos(1))),
+const UNITS: [(&str, DurationUnit); 6] = [
+    ("us", DurationUnit::Time(Span::from_micros(1))),
+    ("ms", DurationUnit::Time(Span::from_millis(1))),
+    ("s", DurationUnit::Time(Span::from_millis(1000))),
+    ("bytes", DurationUnit::Bytes),
+    ("byte", DurationUnit::Bytes),
+    ("ns", DurationUnit::Time(Span::from_nanos(1))),
 ];
 
 impl Duration {
@@ -66,7 +66,7 @@ impl Duration {
         Self {
             digits,
             decimals: 0,
-            unit: Unit::Time(unit),
+            unit: DurationUnit::Time(unit),
             span: TextSpan { start: 0, end: 0 },
         }
     }
@@ -91,8 +91,8 @@ impl Duration {
 
     fn scaled(self, digits: u64, byte_time: Span) -> Span {
         let unit = match self.unit {
-            Unit::Time(unit) => unit,
-            Unit::Bytes => byte_time,
+            DurationUnit::Time(unit) => unit,
+            DurationUnit::Bytes => byte_time,
         };
         let units = u128::from(digits) * u128::from(unit.units()) / 10u128.pow(self.decimals);
         Span::from_units(u64::try_from(units).unwrap_or(u64::MAX))

@@ -10,13 +10,13 @@ pub(super) use system::ask;
 use system::{acknowledge, receive};
 
 #[derive(Debug)]
-pub(super) struct Client {
+pub(super) struct ClientStream {
     stream: TcpStream,
     /// When the input was last empty: what is read next arrived later.
     empty: Instant,
 }
 
-impl Client {
+impl ClientStream {
     /// An accepted connection of a socket that listens since then.
     pub(super) fn new(stream: TcpStream, listening: Instant) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl Client {
     }
 }
 
-impl AsFd for Client {
+impl AsFd for ClientStream {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.stream.as_fd()
     }
@@ -135,7 +135,7 @@ mod system {
 
 #[cfg(test)]
 mod tests {
-    use super::{Client, ask, credible};
+    use super::{ClientStream, ask, credible};
     use harness_proto::time::Span;
     use std::io::{ErrorKind, Write};
     use std::net::{TcpListener, TcpStream};
@@ -173,7 +173,7 @@ mod tests {
             assert_eq!(getsockopt(stream.as_raw_fd(), ReceiveTimestampns), Ok(true));
         }
         stream.set_nonblocking(true).expect("a socket");
-        let mut client = Client::new(stream, listening);
+        let mut client = ClientStream::new(stream, listening);
         let mut buffer = [0; 8];
         let nothing = client.read(&mut buffer).expect_err("nothing was sent");
         assert_eq!(nothing.kind(), ErrorKind::WouldBlock);
@@ -196,7 +196,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let mut far = TcpStream::connect(listener.local_addr().expect("bound")).expect("there");
         let (stream, _) = listener.accept().expect("a client");
-        let mut client = Client::new(stream, Instant::now());
+        let mut client = ClientStream::new(stream, Instant::now());
         let mut buffer = [0; 8];
         for _ in 0..8 {
             far.write_all(&[1]).expect("room");

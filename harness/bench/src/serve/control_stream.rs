@@ -1,7 +1,7 @@
 //! A stream of lines of control and their answers: standard input, or a client of a socket.
 
 use super::control::ControlAnswer;
-use super::lines::Lines;
+use super::lines::LineBuffer;
 use super::place::ControlPlace;
 use super::shell::{ServeError, ServeHost};
 use super::tcp::Tcp;
@@ -17,12 +17,12 @@ const UNREAD: usize = 64 << 10;
 
 /// A source of control lines, with the part of a line received so far and the answers not yet sent.
 pub(super) struct ControlStream {
-    source: Source,
-    lines: Lines,
+    source: ControlSource,
+    lines: LineBuffer,
     answers: Vec<u8>,
 }
 
-enum Source {
+enum ControlSource {
     Standard,
     Tcp(Tcp),
     /// Standard input has ended.
@@ -33,12 +33,12 @@ impl ControlStream {
     /// Listens, if it is a socket.
     pub(super) fn open(place: &ControlPlace, allow_remote: bool) -> Result<Self, ServeError> {
         let source = match place {
-            ControlPlace::Standard => Source::Standard,
-            ControlPlace::Tcp(address) => Source::Tcp(Tcp::listen(address, allow_remote)?),
+            ControlPlace::Standard => ControlSource::Standard,
+            ControlPlace::Tcp(address) => ControlSource::Tcp(Tcp::listen(address, allow_remote)?),
         };
         Ok(Self {
             source,
-            lines: Lines::default(),
+            lines: LineBuffer::default(),
             answers: Vec::new(),
         })
     }
@@ -46,8 +46,8 @@ impl ControlStream {
     /// The address at which it listens, if it is a socket.
     pub(super) fn address(&self) -> Option<SocketAddr> {
         match &self.source {
-            Source::Tcp(tcp) => Some(tcp.address()),
-            Source::Standard | Source::Ended => None,
+            ControlSource::Tcp(tcp) => Some(tcp.address()),
+            ControlSource::Standard | ControlSource::Ended => None,
         }
     }
 
@@ -57,12 +57,14 @@ impl ControlStream {
         stream.set(PollFlags::IN, self.answers.len() < UNREAD);
         stream.set(PollFlags::OUT, !self.answers.is_empty());
         match &self.source {
-            Source::Standard => vec![PollFd::from_borrowed_fd(rustix::stdio::stdin(), stream)],
-            Source::Tcp(tcp) => {
+            ControlSource::Standard => {
+                vec![PollFd::from_borrowed_fd(rustix::stdio::stdin(), stream)]
+            }
+            ControlSource::Tcp(tcp) => {
                 let (door, client) = tcp.polls(stream);
                 std::iter::once(door).chain(client).collect()
             }
-            Source::Ended => Vec::new(),
+            ControlSource::Ended => Vec::new(),
         }
     }
 
@@ -76,12 +78,12 @@ impl ControlStream {
         answer: &mut dyn FnMut(&str) -> Option<ControlAnswer>,
     ) -> io::Result<()> {
         let visitors = match &self.source {
-            Source::Tcp(tcp) => tcp.accept(),
-            Source::Standard | Source::Ended => Vec::new(),
+            ControlSource::Tcp(tcp) => tcp.accept(),
+            ControlSource::Standard | ControlSource::Ended => Vec::new(),
         };
         self.listen(host, answer)?;
         // Who closes a connection and opens the next one has gone before it comes. A second client is turned away.
-        if let Source::Tcp(tcp) = &mut self.source
+        if let ControlSource::Tcp(tcp) = &mut self.source
             && !tcp.taken()
             && let Some((client, _)) = visitors.into_iter().next()
         {
@@ -100,9 +102,9 @@ impl ControlStream {
         let mut buffer = [0; CHUNK];
         while self.answers.len() < UNREAD {
             let read = match &mut self.source {
-                Source::Standard => standard(&mut buffer),
-                Source::Tcp(tcp) => tcp.read(&mut buffer).map(|(read, _)| read),
-                Source::Ended => break,
+                ControlSource::Standard => standard(&mut buffer),
+                ControlSource::Tcp(tcp) => tcp.read(&mut buffer).map(|(read, _)| read),
+                ControlSource::Ended => break,
             };
             let (lines, ended) = match read {
                 Ok(read @ 1..) => (self.lines.push(&buffer[..read]), false),
@@ -120,7 +122,7 @@ impl ControlStream {
                 let Some(answer) = answer else {
                     continue;
                 };
-                if matches!(self.source, Source::Standard) {
+                if matches!(self.source, ControlSource::Standard) {
                     host.tell(&answer.to_string())?;
                 } else {
                     self.answers.extend(format!("{answer}\n").bytes());
@@ -129,8 +131,8 @@ impl ControlStream {
             self.pass_on();
             if ended {
                 match &mut self.source {
-                    Source::Tcp(tcp) => tcp.close(),
-                    other => *other = Source::Ended,
+                    ControlSource::Tcp(tcp) => tcp.close(),
+                    other => *other = ControlSource::Ended,
                 }
                 self.answers.clear();
                 break;
@@ -141,7 +143,7 @@ impl ControlStream {
 
     /// Writes answers as far as they are taken.
     fn pass_on(&mut self) {
-        let Source::Tcp(tcp) = &mut self.source else {
+        let ControlSource::Tcp(tcp) = &mut self.source else {
             return;
         };
         while !self.answers.is_empty() {

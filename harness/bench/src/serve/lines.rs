@@ -7,12 +7,12 @@ pub(super) type ReadLine = Result<String, usize>;
 
 /// The bytes of an unfinished line. A line that is too long is not kept.
 #[derive(Debug, Default)]
-pub(super) struct Lines {
+pub(super) struct LineBuffer {
     begun: Vec<u8>,
     length: usize,
 }
 
-impl Lines {
+impl LineBuffer {
     /// Takes bytes and returns the lines that they complete. Invalid UTF-8 is replaced, so such a line is not one of the
     /// language.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<ReadLine> {
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn lines_come_whole_and_long_ones_are_counted() {
-        let mut lines = Lines::default();
+        let mut lines = LineBuffer::default();
         assert!(lines.push(b"ab").is_empty());
         let both = lines.push(b"c\n\nde\nf");
         assert_eq!(both, [Ok("abc".to_owned()), Ok("de".to_owned())]);

@@ -33,7 +33,7 @@ pub(super) struct Pty {
 
 /// What has happened to the client's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Change {
+pub(super) enum PtyEvent {
     Came,
     Gone,
 }
@@ -83,15 +83,15 @@ impl Pty {
 
     /// Returns whether a client has come or gone; call it after reading what the client sent. A client that has come and gone since the
     /// last call shows in two calls.
-    pub(super) fn change(&mut self) -> Option<Change> {
+    pub(super) fn change(&mut self) -> Option<PtyEvent> {
         let opened = self.was_opened();
         match (self.here, self.is_open()) {
             (false, open) if open || opened => {
                 self.here = true;
-                Some(Change::Came)
+                Some(PtyEvent::Came)
             }
             // It stays here until `gone` is called: its bytes may still have to be read.
-            (true, false) => Some(Change::Gone),
+            (true, false) => Some(PtyEvent::Gone),
             _ => None,
         }
     }
@@ -191,7 +191,7 @@ mod tests {
             assert_eq!(pty.change(), None);
             let client = open();
             drop(open());
-            assert_eq!(pty.change(), Some(Change::Came));
+            assert_eq!(pty.change(), Some(PtyEvent::Came));
             drop(open());
             assert_eq!(pty.change(), None);
             assert_eq!(pty.write(b"\x80\x81").expect("room"), 2);
@@ -201,12 +201,12 @@ mod tests {
             // What it leaves unread is not the next client's.
             assert_eq!(pty.write(b"\x82").expect("room"), 1);
             drop(client);
-            assert_eq!(pty.change(), Some(Change::Gone));
+            assert_eq!(pty.change(), Some(PtyEvent::Gone));
             assert!(!pty.gone());
             // One that is gone before the server looks.
             drop(open());
-            assert_eq!(pty.change(), Some(Change::Came));
-            assert_eq!(pty.change(), Some(Change::Gone));
+            assert_eq!(pty.change(), Some(PtyEvent::Came));
+            assert_eq!(pty.change(), Some(PtyEvent::Gone));
             assert!(!pty.gone());
         }
     }

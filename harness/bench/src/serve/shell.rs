@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::control_stream::ControlStream;
 use super::place::{ControlPlace, ServedAt};
-use super::pty::{Change, Pty};
+use super::pty::{Pty, PtyEvent};
 use super::served::ServedBus;
 use super::stage::Stage;
 use super::tcp::Tcp;
@@ -148,9 +148,9 @@ pub fn serve_until(
     let mut ends = Vec::new();
     for place in &options.places {
         ends.push(match place {
-            ServedAt::Tcp(address) => Seat::Tcp(Tcp::listen(address, options.allow_remote)?),
-            ServedAt::Pty(path) => Seat::Pty(Pty::open(path)?),
-            ServedAt::Nowhere => Seat::Nowhere,
+            ServedAt::Tcp(address) => ClientEnd::Tcp(Tcp::listen(address, options.allow_remote)?),
+            ServedAt::Pty(path) => ClientEnd::Pty(Pty::open(path)?),
+            ServedAt::Nowhere => ClientEnd::Nowhere,
         });
     }
     let control = options.control.as_ref();
@@ -229,7 +229,7 @@ impl Drop for EndRequest {
 }
 
 /// Where a client's stream comes from.
-enum Seat {
+enum ClientEnd {
     Tcp(Tcp),
     Pty(Pty),
     Nowhere,
@@ -237,7 +237,7 @@ enum Seat {
 
 struct Shell<'a> {
     server: &'a mut dyn ServedBus,
-    ends: Vec<Seat>,
+    ends: Vec<ClientEnd>,
     control: Option<ControlStream>,
     stage: Option<Stage>,
     host: &'a mut dyn ServeHost,
@@ -258,12 +258,12 @@ impl Shell<'_> {
         let mut lines = Vec::new();
         for (seat, end) in self.ends.iter().enumerate() {
             let place = match end {
-                Seat::Tcp(tcp) => {
+                ClientEnd::Tcp(tcp) => {
                     self.host.listens(tcp.address());
                     tcp.address().to_string()
                 }
-                Seat::Pty(pty) => pty.link().display().to_string(),
-                Seat::Nowhere => continue,
+                ClientEnd::Pty(pty) => pty.link().display().to_string(),
+                ClientEnd::Nowhere => continue,
             };
             lines.push(format!("{} at {place}", self.server.title(seat)));
         }
@@ -330,13 +330,13 @@ impl Shell<'_> {
             stream.set(PollFlags::IN, self.server.room(seat) > 0);
             stream.set(PollFlags::OUT, !self.server.transmit(seat).is_empty());
             match end {
-                Seat::Tcp(tcp) => {
+                ClientEnd::Tcp(tcp) => {
                     let (door, client) = tcp.polls(stream);
                     fds.push(door);
                     fds.extend(client);
                 }
-                Seat::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
-                Seat::Nowhere => {}
+                ClientEnd::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
+                ClientEnd::Nowhere => {}
             }
         }
         fds.extend(self.control.iter().flat_map(ControlStream::polls));
@@ -361,8 +361,8 @@ impl Shell<'_> {
     /// Lets clients come, speak and go.
     fn attend(&mut self, seat: usize) {
         let visitors = match &mut self.ends[seat] {
-            Seat::Tcp(tcp) => tcp.accept(),
-            Seat::Pty(_) | Seat::Nowhere => Vec::new(),
+            ClientEnd::Tcp(tcp) => tcp.accept(),
+            ClientEnd::Pty(_) | ClientEnd::Nowhere => Vec::new(),
         };
         for (client, address) in visitors {
             // Who closes a connection and opens the next one has gone before it comes.
@@ -370,7 +370,7 @@ impl Shell<'_> {
                 self.fail(seat, &error);
             }
             match &mut self.ends[seat] {
-                Seat::Tcp(tcp) if !tcp.taken() => {
+                ClientEnd::Tcp(tcp) if !tcp.taken() => {
                     tcp.seat(client);
                     self.come(seat, &format!("client {address} came"));
                 }
@@ -383,7 +383,7 @@ impl Shell<'_> {
         match (self.hear(seat), &mut self.ends[seat]) {
             (Err(error), _) => self.fail(seat, &error),
             // Keeps the client's seat until its input is drained.
-            (Ok(true), Seat::Pty(pty)) => {
+            (Ok(true), ClientEnd::Pty(pty)) => {
                 if let Some(change) = pty.change() {
                     self.change(seat, change);
                 }
@@ -394,7 +394,7 @@ impl Shell<'_> {
 
     /// Handles a failed stream. A socket's client has disconnected. At a pseudo terminal no client is left, which its hang-up shows.
     fn fail(&mut self, seat: usize, error: &io::Error) {
-        if let Seat::Tcp(tcp) = &mut self.ends[seat]
+        if let ClientEnd::Tcp(tcp) = &mut self.ends[seat]
             && tcp.taken()
         {
             tcp.close();
@@ -407,15 +407,15 @@ impl Shell<'_> {
     }
 
     /// Handles a client that opens or closes a pseudo terminal.
-    fn change(&mut self, seat: usize, change: Change) {
+    fn change(&mut self, seat: usize, change: PtyEvent) {
         match change {
-            Change::Came => self.come(seat, "a client came"),
-            Change::Gone => {
+            PtyEvent::Came => self.come(seat, "a client came"),
+            PtyEvent::Gone => {
                 // Reads what the client sent last. An error only means that no client is left.
                 let _read = self.hear(seat);
                 let another = match &mut self.ends[seat] {
-                    Seat::Pty(pty) => pty.gone(),
-                    Seat::Tcp(_) | Seat::Nowhere => false,
+                    ClientEnd::Pty(pty) => pty.gone(),
+                    ClientEnd::Tcp(_) | ClientEnd::Nowhere => false,
                 };
                 self.go(seat, "the client has gone");
                 if another {
@@ -460,9 +460,9 @@ impl Shell<'_> {
                 return Ok(false);
             }
             let read = match &mut self.ends[seat] {
-                Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
-                Seat::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
-                Seat::Nowhere => return Ok(true),
+                ClientEnd::Tcp(tcp) => tcp.read(&mut buffer[..room]),
+                ClientEnd::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
+                ClientEnd::Nowhere => return Ok(true),
             };
             let (read, ago) = match read {
                 Ok((0, _)) => return Err(io::ErrorKind::UnexpectedEof.into()),
@@ -472,8 +472,8 @@ impl Shell<'_> {
                 Err(error) => return Err(error),
             };
             let news = match &mut self.ends[seat] {
-                Seat::Pty(pty) => pty.heard(),
-                Seat::Tcp(_) | Seat::Nowhere => false,
+                ClientEnd::Pty(pty) => pty.heard(),
+                ClientEnd::Tcp(_) | ClientEnd::Nowhere => false,
             };
             if news {
                 self.come(seat, "a client came");
@@ -499,9 +499,9 @@ impl Shell<'_> {
             }
             let before = std::time::Instant::now();
             let written = match &mut self.ends[seat] {
-                Seat::Tcp(tcp) => tcp.write(bytes),
-                Seat::Pty(pty) => pty.write(bytes),
-                Seat::Nowhere => return Ok(()),
+                ClientEnd::Tcp(tcp) => tcp.write(bytes),
+                ClientEnd::Pty(pty) => pty.write(bytes),
+                ClientEnd::Nowhere => return Ok(()),
             };
             match written {
                 Ok(written) => {

@@ -1,6 +1,6 @@
 //! Sockets that listen: for several clients, or for one at a time.
 
-use super::arrival::{Client, ask};
+use super::arrival::{ClientStream, ask};
 use crate::listen::{ListenError, listen};
 use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
@@ -41,14 +41,14 @@ impl Listener {
     }
 
     /// Accepts waiting connections, a bounded number at a time.
-    pub(super) fn accept(&self) -> impl Iterator<Item = (Client, SocketAddr)> {
+    pub(super) fn accept(&self) -> impl Iterator<Item = (ClientStream, SocketAddr)> {
         // A connection that fails here has closed again or will be accepted later.
         let waiting = std::iter::from_fn(|| self.socket.accept().ok()).take(TAKEN);
         waiting.filter_map(|(stream, address)| {
             stream.set_nonblocking(true).ok()?;
             // Bytes are to be sent at once. If this fails, they arrive later, but they arrive.
             let _late = stream.set_nodelay(true);
-            Some((Client::new(stream, self.since), address))
+            Some((ClientStream::new(stream, self.since), address))
         })
     }
 }
@@ -57,7 +57,7 @@ impl Listener {
 #[derive(Debug)]
 pub(super) struct Tcp {
     listener: Listener,
-    client: Option<Client>,
+    client: Option<ClientStream>,
 }
 
 impl Tcp {
@@ -78,12 +78,12 @@ impl Tcp {
     }
 
     /// Accepts waiting connections: who comes, and from where.
-    pub(super) fn accept(&self) -> Vec<(Client, SocketAddr)> {
+    pub(super) fn accept(&self) -> Vec<(ClientStream, SocketAddr)> {
         self.listener.accept().collect()
     }
 
     /// Accepts a client; there must be none.
-    pub(super) fn seat(&mut self, client: Client) {
+    pub(super) fn seat(&mut self, client: ClientStream) {
         self.client = Some(client);
     }
 

@@ -1,6 +1,6 @@
 //! Which requests are let in: this machine's own name, the page's own origin, the token.
 
-use super::request::{Head, Refusal};
+use super::request::{Refusal, RequestHead};
 use super::view::LiveOrder;
 use std::net::SocketAddr;
 
@@ -48,7 +48,7 @@ pub(super) fn hosts(local: SocketAddr, name: &str) -> Vec<String> {
 ///
 /// # Errors
 /// [`Refusal`] with the status of HTTP.
-pub(super) fn admit(head: &Head, hosts: &[String], token: &str) -> Result<Route, Refusal> {
+pub(super) fn admit(head: &RequestHead, hosts: &[String], token: &str) -> Result<Route, Refusal> {
     let host = head.header("host").unwrap_or_default();
     if !hosts.iter().any(|known| known.eq_ignore_ascii_case(host)) {
         return Err(Refusal::new(

@@ -40,7 +40,7 @@ impl Refusal {
 
 /// A request without its body.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Head {
+pub(super) struct RequestHead {
     pub(super) method: String,
     pub(super) target: String,
     /// Names in lower case, and values.
@@ -53,12 +53,12 @@ pub(super) enum Read {
     /// The begin of a head.
     More,
     /// A head, and how many bytes it has.
-    Head(Head, usize),
+    Head(RequestHead, usize),
     /// No head.
     Bad(Refusal),
 }
 
-impl Head {
+impl RequestHead {
     /// The value of a header, its name in lower case.
     pub(super) fn header(&self, name: &str) -> Option<&str> {
         let mut headers = self.headers.iter();
@@ -109,7 +109,7 @@ pub(super) fn read(bytes: &[u8]) -> Read {
     }
 }
 
-fn head(bytes: &[u8]) -> Result<Head, &'static str> {
+fn head(bytes: &[u8]) -> Result<RequestHead, &'static str> {
     let plain = |byte: &u8| matches!(byte, b'\t' | b'\r' | b'\n' | b' '..=b'~');
     if !bytes.iter().all(plain) {
         return Err("a head of printable ASCII characters expected");
@@ -125,7 +125,7 @@ fn head(bytes: &[u8]) -> Result<Head, &'static str> {
     if !is_token(method) || !target.starts_with('/') {
         return Err("a method and a path that begins with / expected");
     }
-    let mut head = Head {
+    let mut head = RequestHead {
         method: method.to_owned(),
         target: target.to_owned(),
         headers: Vec::new(),

@@ -3,7 +3,7 @@
 use super::feed::{Feed, FeedPiece};
 use super::gate::{Route, admit, hosts, order};
 use super::page::{page, policy};
-use super::request::{Head, MAX_HEAD, Read, Refusal, read};
+use super::request::{MAX_HEAD, Read, Refusal, RequestHead, read};
 use super::view::{LiveOrder, LiveScene};
 use crate::listen::{ListenError, listen};
 use rustix::event::{PollFd, PollFlags, poll};
@@ -327,7 +327,7 @@ fn routed(stream: &TcpStream, shared: &PageState, end: Instant) -> Result<Reply,
 /// Reads the body after a head; `bytes` of it were received.
 fn body(
     stream: &TcpStream,
-    head: &Head,
+    head: &RequestHead,
     mut bytes: Vec<u8>,
     end: Instant,
 ) -> Result<Vec<u8>, Option<Refusal>> {

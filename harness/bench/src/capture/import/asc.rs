@@ -16,7 +16,7 @@ use super::super::CaptureError;
 use super::super::frames::{Log, LogEntry, LogItem};
 use super::super::order::Place;
 use super::logs::{frame, identifier, logged};
-use super::numbers::{Time, seconds};
+use super::numbers::{SignedTime, seconds};
 
 /// The number of lines in which to look for a heading.
 const HEADING: usize = 20;
@@ -32,11 +32,11 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
     })
 }
 
-struct Reader {
+struct AscReader {
     radix: u32,
     relative: bool,
     /// The time of the event before.
-    before: Time,
+    before: SignedTime,
     /// The present line and block. A trigger begins and ends a block.
     place: Place,
 }
@@ -47,7 +47,7 @@ struct Reader {
 /// A line that cannot be.
 pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
     let text = String::from_utf8_lossy(bytes);
-    let mut reader = Reader {
+    let mut reader = AscReader {
         radix: 16,
         relative: false,
         before: 0,
@@ -71,7 +71,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
     Ok(log)
 }
 
-impl Reader {
+impl AscReader {
     /// A line; `None` where it has no frame.
     fn line(&mut self, line: &str) -> Result<Option<LogEntry>, String> {
         let words: Vec<&str> = line.split_whitespace().take(40).collect();
@@ -111,7 +111,7 @@ impl Reader {
     }
 
     /// What follows a time.
-    fn event(&self, at: Time, words: &[&str]) -> Result<Option<LogEntry>, String> {
+    fn event(&self, at: SignedTime, words: &[&str]) -> Result<Option<LogEntry>, String> {
         let (channel, what) = match words {
             ["CANFD", channel, "Rx" | "Tx", rest @ ..] => (channel, with_flags(rest)?),
             [channel, "ErrorFrame", ..] => (channel, LogItem::Error),

@@ -99,14 +99,14 @@ impl Radix {
 }
 
 /// A row of the table of a decoder. Its fields are not quoted: a comma and a quotation mark are octets as well.
-struct Row<'b> {
+struct DecoderRow<'b> {
     /// Its line, counted from 1.
     line: usize,
     time: &'b str,
     fields: Vec<&'b str>,
 }
 
-impl<'b> Row<'b> {
+impl<'b> DecoderRow<'b> {
     fn of(line: usize, text: &'b str, decoders: usize) -> Option<Self> {
         let (_, rest) = text.split_once(',')?;
         let (time, rest) = rest.split_once(',')?;
@@ -144,9 +144,9 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Channels, CaptureError> {
     let rows = lines.map(|(number, line)| {
         let count = names.len();
         let expected = || wrong(number + 2, format!("{} fields are expected", count + 2));
-        Row::of(number + 2, line, count).ok_or_else(expected)
+        DecoderRow::of(number + 2, line, count).ok_or_else(expected)
     });
-    let rows: Vec<Row<'_>> = rows.collect::<Result<_, _>>()?;
+    let rows: Vec<DecoderRow<'_>> = rows.collect::<Result<_, _>>()?;
     let mut channels = Vec::new();
     for (column, name) in names.into_iter().enumerate() {
         let fields = || rows.iter().map(|row| (row, field(row.fields[column])));

@@ -11,12 +11,12 @@
 //! | CANHacker | `17,123 201 3 3D 40 00`; the time begins again each minute |
 
 use super::logs::{State, frame, identifier, logged, shows};
-use super::numbers::{Time, seconds};
+use super::numbers::{SignedTime, seconds};
 use super::table::first_line;
 use crate::capture::frames::{LogEntry, LogItem};
 
 /// Units of a second.
-const SECOND: Time = 3_000_000_000;
+const SECOND: SignedTime = 3_000_000_000;
 
 /// The words of the first line that is not empty.
 fn begins(bytes: &[u8], words: &[&str]) -> bool {
@@ -164,7 +164,7 @@ pub(super) fn busmaster(state: &mut State, line: &str) -> Result<Option<LogEntry
     let parts: Vec<&str> = time.splitn(4, ':').collect();
     let at = match parts.as_slice() {
         [hours, minutes, second, part] => {
-            let whole = |text: &str| text.parse::<u8>().ok().map(Time::from);
+            let whole = |text: &str| text.parse::<u8>().ok().map(SignedTime::from);
             let seconds = seconds(&format!("{second}.{part}"));
             whole(hours)
                 .zip(whole(minutes))

@@ -3,7 +3,7 @@
 use super::super::telegrams::{DAY, LATEST, assemble};
 use super::super::{Assembly, CaptureError, ends, line_byte};
 use super::levels::Levels;
-use super::numbers::Time;
+use super::numbers::SignedTime;
 use super::uart::{OctetRead, UartFormat, decode, find};
 use super::{Imported, ReadSettings};
 use crate::capture::line_formats;
@@ -256,7 +256,7 @@ fn format(
         Signal::Levels(_) | Signal::Other(_) => None,
     });
     let gaps = starts.flatten().map(|two| two[1].start - two[0].start);
-    let closest = gaps.filter(|gap| *gap > 0).min().unwrap_or(Time::MAX);
+    let closest = gaps.filter(|gap| *gap > 0).min().unwrap_or(SignedTime::MAX);
     let fits = |format: &&Format| format.octet_time().units() / 10 * 9 <= closest.cast_unsigned();
     let mut fitting: Vec<&Format> = formats.iter().filter(fits).collect();
     fitting.sort_by_key(|format| format.bits_per_second);
@@ -334,7 +334,7 @@ pub(super) fn settle(
         0.. if Span::from_units(first.cast_unsigned()).as_nanos() <= DAY => 0,
         _ => first,
     };
-    let nanos = |start: Time| {
+    let nanos = |start: SignedTime| {
         let since = u64::try_from(start.checked_sub(base)?).ok()?;
         let nanos = (Span::from_units(since) + octet).as_nanos();
         (nanos <= LATEST).then_some(nanos)

@@ -10,7 +10,7 @@
 use super::super::CaptureError;
 use super::super::frames::{Log, LogEntry, LogItem};
 use super::super::order::Place;
-use super::numbers::{Time, date, seconds};
+use super::numbers::{SignedTime, date, seconds};
 use crate::counted::counted;
 use crate::report::pcapng_frames::ERROR;
 use harness_proto::can::{Frame, Id};
@@ -33,7 +33,7 @@ pub(super) struct State {
     /// Each time counts from the frame before.
     pub(super) relative: bool,
     /// After how long its clock begins again.
-    pub(super) wraps: Option<Time>,
+    pub(super) wraps: Option<SignedTime>,
     /// A line was in the form of the screen.
     screen: bool,
     /// The log says that frames are missing.
@@ -132,7 +132,7 @@ fn begins_a_frame(line: &str, channel: &str) -> bool {
 fn settle_times(log: &mut Log, state: &mut State) {
     // A log of as many frames in which each cycle is shorter than the one before has not been seen.
     const ENOUGH: usize = 20;
-    let times: Vec<Time> = log.frames.iter().filter_map(|logged| logged.at).collect();
+    let times: Vec<SignedTime> = log.frames.iter().filter_map(|logged| logged.at).collect();
     if times.len() < 3 || times[0] != 0 {
         return;
     }
@@ -151,14 +151,14 @@ fn settle_times(log: &mut Log, state: &mut State) {
 }
 
 /// Times of a clock that begins again after `period`, as times since the first frame.
-fn unwrap_times(frames: &mut [LogEntry], period: Time) {
+fn unwrap_times(frames: &mut [LogEntry], period: SignedTime) {
     let first = frames.iter().find_map(|logged| logged.at).unwrap_or(0);
     let (mut before, mut added) = (None, first.saturating_neg());
     for logged in frames {
         let Some(at) = logged.at else {
             continue;
         };
-        if before.is_some_and(|before: Time| before - at > period / 2) {
+        if before.is_some_and(|before: SignedTime| before - at > period / 2) {
             added = added.saturating_add(period);
         }
         before = Some(at);
@@ -214,7 +214,7 @@ pub(super) fn identifier(text: &str, radix: u32) -> Result<u32, String> {
     number.ok_or_else(|| format!("`{text}` is no identifier"))
 }
 
-pub(super) fn logged(channel: &str, at: Option<Time>, what: LogItem) -> LogEntry {
+pub(super) fn logged(channel: &str, at: Option<SignedTime>, what: LogItem) -> LogEntry {
     LogEntry {
         channel: channel.to_owned(),
         at,
@@ -235,7 +235,7 @@ fn plain(line: &str) -> String {
 }
 
 /// The time at the beginning of a line of candump, and the words after it.
-fn split_time(line: &str) -> Result<(Option<Time>, Vec<&str>), String> {
+fn split_time(line: &str) -> Result<(Option<SignedTime>, Vec<&str>), String> {
     let Some(rest) = line.trim_start().strip_prefix('(') else {
         return Ok((None, line.split_whitespace().collect()));
     };
@@ -251,7 +251,7 @@ fn split_time(line: &str) -> Result<(Option<Time>, Vec<&str>), String> {
 }
 
 /// The time of a line of candump that has a frame.
-pub(in crate::capture) fn candump_time(line: &str) -> Option<Time> {
+pub(in crate::capture) fn candump_time(line: &str) -> Option<SignedTime> {
     let (time, words) = split_time(line).ok()?;
     time.filter(|_| is_log(&words) || is_screen(&words))
 }
@@ -314,7 +314,7 @@ pub(super) fn candump(state: &mut State, line: &str) -> Result<Option<LogEntry>,
 }
 
 /// The frame of a line of candump -L.
-fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<LogEntry, String> {
+fn one_word(channel: &str, at: Option<SignedTime>, frame: &str) -> Result<LogEntry, String> {
     let (id, data) = frame.split_once('#').unwrap_or((frame, ""));
     let what = if data.starts_with('#') {
         LogItem::Fd
@@ -330,7 +330,7 @@ fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<LogEntry, St
 
 /// The frame of a line on the screen: `can0  201   [3]  3D 40 00`, with `RX - -` after the interface (`-x`), bytes in binary (`-i`), or
 /// their characters after them (`-a`).
-fn screen(at: Option<Time>, words: &[&str]) -> Result<LogEntry, String> {
+fn screen(at: Option<SignedTime>, words: &[&str]) -> Result<LogEntry, String> {
     let (channel, rest) = match words {
         [channel, "RX" | "TX", _, _, rest @ ..] | [channel, rest @ ..] => (*channel, rest),
         [] => ("", words),

@@ -1,13 +1,13 @@
 //! Times and values as other programs write them.
 
 /// Thirds of a nanosecond, signed: since the start of a capture, or since 1970. 97 years fit.
-pub(super) type Time = i64;
+pub(super) type SignedTime = i64;
 
 /// Picoseconds of a second.
 const SECOND: i128 = 1_000_000_000_000;
 
 /// A time in seconds: `0.000287`, `-1.5e-3`, with a comma in place of the point too.
-pub(super) fn seconds(text: &str) -> Option<Time> {
+pub(super) fn seconds(text: &str) -> Option<SignedTime> {
     let text = text.trim();
     let (negative, text) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -42,21 +42,21 @@ pub(super) fn seconds(text: &str) -> Option<Time> {
 }
 
 /// Picoseconds as a time, to the nearest.
-pub(super) fn units(picoseconds: i128) -> Option<Time> {
+pub(super) fn units(picoseconds: i128) -> Option<SignedTime> {
     let thirds = picoseconds.checked_mul(3)?;
-    Time::try_from((thirds + 500 * thirds.signum()) / 1_000).ok()
+    SignedTime::try_from((thirds + 500 * thirds.signum()) / 1_000).ok()
 }
 
 /// Seconds of a binary file.
-pub(super) fn from_float(seconds: f64) -> Option<Time> {
+pub(super) fn from_float(seconds: f64) -> Option<SignedTime> {
     const MOST: f64 = 3.0e9 * 365.25 * 86_400.0 * 90.0;
     let units = (seconds * 3.0e9).round();
     // A cast of a number in this range loses nothing.
-    (units.is_finite() && units.abs() < MOST).then_some(units as Time)
+    (units.is_finite() && units.abs() < MOST).then_some(units as SignedTime)
 }
 
 /// A date and time of ISO 8601, `2022-01-05T12:34:56.789+01:00`, since 1970.
-pub(super) fn date(text: &str) -> Option<Time> {
+pub(super) fn date(text: &str) -> Option<SignedTime> {
     let (date, time) = text.trim().split_once(['T', ' '])?;
     let number = |text: &str, digits: usize| {
         let valid = text.len() == digits && text.bytes().all(|digit| digit.is_ascii_digit());

@@ -2,9 +2,9 @@
 
 use super::super::CaptureError;
 use super::Channels;
-use super::levels::{Level, Levels, sample_time};
+use super::levels::{Levels, LineLevel, sample_time};
 use super::links::{ChannelRead, Signal};
-use super::numbers::{Time, byte, date, from_float, seconds};
+use super::numbers::{SignedTime, byte, date, from_float, seconds};
 use super::table::{Table, columns, first_line};
 use super::uart::OctetRead;
 use crate::counted::counted;
@@ -58,7 +58,7 @@ pub(super) fn levels(bytes: &[u8]) -> Result<Channels, CaptureError> {
 /// The row and the field that cannot be.
 pub(super) fn levels_of(
     mut table: Table<'_>,
-    sample: Option<Time>,
+    sample: Option<SignedTime>,
 ) -> Result<Channels, CaptureError> {
     let line = Levels {
         sample,
@@ -74,8 +74,8 @@ pub(super) fn levels_of(
         let time = time(&table, 0)?;
         for (place, (line, other)) in lines.iter_mut().enumerate() {
             let level = match table.raw(place + 1).trim_ascii() {
-                [level] => Level::of(*level),
-                [] => Some(Level::Unknown),
+                [level] => LineLevel::of(*level),
+                [] => Some(LineLevel::Unknown),
                 _ => None,
             };
             // An analogue channel has voltages.
@@ -98,7 +98,7 @@ pub(super) fn levels_of(
 }
 
 /// The time of a row: seconds, or a date.
-fn time(table: &Table<'_>, column: usize) -> Result<Time, CaptureError> {
+fn time(table: &Table<'_>, column: usize) -> Result<SignedTime, CaptureError> {
     let text = table.text(column);
     let time = seconds(&text).or_else(|| date(&text));
     time.ok_or_else(|| table.wrong_field(column, "a time in seconds or a date is expected"))
@@ -160,7 +160,7 @@ pub(super) fn analyser(bytes: &[u8]) -> Result<Channels, CaptureError> {
 pub(super) fn in_order(
     table: &Table<'_>,
     last: Option<&OctetRead>,
-    start: Time,
+    start: SignedTime,
 ) -> Result<(), CaptureError> {
     match last {
         Some(last) if start < last.start => {
@@ -272,7 +272,7 @@ impl Binary<'_> {
         self.take().map(u64::from_le_bytes)
     }
 
-    fn time(&mut self) -> Result<Time, CaptureError> {
+    fn time(&mut self) -> Result<SignedTime, CaptureError> {
         let place = self.at;
         let seconds = f64::from_le_bytes(self.take()?);
         from_float(seconds).ok_or_else(|| CaptureError::At {
@@ -285,9 +285,9 @@ impl Binary<'_> {
     fn part(&mut self, levels: &mut Levels, with_rate: bool) -> Result<(), CaptureError> {
         let level = |state: u32| {
             if state & 1 == 1 {
-                Level::High
+                LineLevel::High
             } else {
-                Level::Low
+                LineLevel::Low
             }
         };
         let state = self.u32()?;
@@ -316,7 +316,7 @@ impl Binary<'_> {
             }
         }
         // Between two parts nothing was recorded.
-        if !levels.push(end, Level::Unknown) {
+        if !levels.push(end, LineLevel::Unknown) {
             return self.wrong("the part ends before its last change");
         }
         levels.end = Some(end);

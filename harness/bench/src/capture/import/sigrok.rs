@@ -4,9 +4,9 @@
 //! nowhere. sigrok's own reader takes the rows of other programs for samples at equal times, so such tables are not to go through it.
 
 use super::super::CaptureError;
-use super::levels::{Level, Levels, sample_time};
+use super::levels::{Levels, LineLevel, sample_time};
 use super::links::{ChannelRead, Signal};
-use super::numbers::{Time, units};
+use super::numbers::{SignedTime, units};
 
 /// The number of rows, no two of them equal, from which on equal rows must have been left out.
 const ALL_DIFFER: u64 = 100;
@@ -98,7 +98,7 @@ pub(super) fn read(
 
 impl<'b> Samples<'b> {
     /// The time of the next sample.
-    fn time(&self) -> Option<Time> {
+    fn time(&self) -> Option<SignedTime> {
         let second = i128::from(self.count) * 1_000_000_000_000;
         units(second.checked_div(self.rate?.into())?)
     }
@@ -148,7 +148,7 @@ impl<'b> Samples<'b> {
         let lines = self.lines.iter_mut().zip(&mut self.others);
         for ((levels, other), field) in lines.zip(fields()) {
             let level = match field.trim_ascii() {
-                [level] => Level::of(*level),
+                [level] => LineLevel::of(*level),
                 _ => None,
             };
             let Some(level) = level else {

@@ -1,7 +1,7 @@
 //! From the levels of a line to octets: an asynchronous receiver with 8 data bits.
 
-use super::levels::{Change, Level, Levels};
-use super::numbers::Time;
+use super::levels::{LevelChange, Levels, LineLevel};
+use super::numbers::SignedTime;
 use harness_proto::line::{Format, LineError, Parity};
 use std::fmt;
 use std::str::FromStr;
@@ -77,7 +77,7 @@ impl fmt::Display for UartFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OctetRead {
     /// When its start bit began.
-    pub(super) start: Time,
+    pub(super) start: SignedTime,
     pub(super) byte: u8,
     pub(super) error: Option<LineError>,
 }
@@ -90,11 +90,11 @@ pub(super) fn decode(levels: &Levels, uart: UartFormat, most: usize) -> Vec<Octe
         end: levels.end,
     };
     let (idle, active) = match uart.inverted {
-        false => (Level::High, Level::Low),
-        true => (Level::Low, Level::High),
+        false => (LineLevel::High, LineLevel::Low),
+        true => (LineLevel::Low, LineLevel::High),
     };
     let mut octets = Vec::new();
-    let mut free = Time::MIN;
+    let mut free = SignedTime::MIN;
     for (index, pair) in receiver.changes.windows(2).enumerate() {
         let starts = pair[0].level == idle && pair[1].level == active && pair[1].at >= free;
         if !starts {
@@ -114,14 +114,14 @@ pub(super) fn decode(levels: &Levels, uart: UartFormat, most: usize) -> Vec<Octe
 }
 
 struct Receiver<'c> {
-    changes: &'c [Change],
+    changes: &'c [LevelChange],
     place: usize,
-    end: Option<Time>,
+    end: Option<SignedTime>,
 }
 
 impl Receiver<'_> {
     /// The level at a time; times only grow. `None` where it is not known.
-    fn level(&mut self, at: Time) -> Option<Level> {
+    fn level(&mut self, at: SignedTime) -> Option<LineLevel> {
         while self
             .changes
             .get(self.place + 1)
@@ -131,17 +131,17 @@ impl Receiver<'_> {
         }
         let level = self.changes.get(self.place)?.level;
         let known = self.end.is_none_or(|end| at <= end);
-        (known && level != Level::Unknown).then_some(level)
+        (known && level != LineLevel::Unknown).then_some(level)
     }
 
     /// The octet whose start bit begins at `start`: its byte, its error, and when its stop bit was looked at. `None` for a pulse that is no
     /// start bit, and where the line is not known in the middle of it.
     fn octet(
         &mut self,
-        start: Time,
+        start: SignedTime,
         format: Format,
-        idle: Level,
-    ) -> Option<(u8, Option<LineError>, Time)> {
+        idle: LineLevel,
+    ) -> Option<(u8, Option<LineError>, SignedTime)> {
         let rate = i64::from(format.bits_per_second).max(1);
         // Each bit is looked at in its middle.
         let middle = |bit: i64| start.saturating_add(SECOND * (2 * bit + 1) / (2 * rate));
@@ -236,19 +236,19 @@ impl fmt::Display for Score {
 const ENOUGH: usize = 100;
 
 /// The time, in thirds of a nanosecond, that lines spent in pulses that `wanted` chooses by their level and their length.
-fn spent(lines: &[&Levels], wanted: impl Fn(Level, Time) -> bool) -> (Time, usize) {
+fn spent(lines: &[&Levels], wanted: impl Fn(LineLevel, SignedTime) -> bool) -> (SignedTime, usize) {
     let pulses = lines.iter().flat_map(|line| line.changes().windows(2));
     let pulses = pulses.map(|two| (two[0].level, two[1].at - two[0].at));
     let chosen = pulses.filter(|(level, length)| wanted(*level, *length));
     chosen.fold((0, 0), |(time, count), (_, length)| {
-        (Time::saturating_add(time, length), count + 1)
+        (SignedTime::saturating_add(time, length), count + 1)
     })
 }
 
 /// Whether a line may have this rate: less than a quarter of its pulses are much shorter than a bit. At the next higher rate half of them are.
 fn slow_enough(lines: &[&Levels], format: Format) -> bool {
     let bit = SECOND / i64::from(format.bits_per_second).max(1);
-    let known = |level| level != Level::Unknown;
+    let known = |level| level != LineLevel::Unknown;
     let (_, all) = spent(lines, |level, _| known(level));
     let (_, short) = spent(lines, |level, length| known(level) && length < bit * 7 / 10);
     short * 4 < all.max(1)
@@ -257,7 +257,7 @@ fn slow_enough(lines: &[&Levels], format: Format) -> bool {
 /// Whether lines are longer low than high where they are quiet for more than an octet; `None` where they never are.
 fn quiet_low(lines: &[&Levels], format: Format) -> Option<bool> {
     let octet = format.octet_time().units().cast_signed();
-    let [low, high] = [Level::Low, Level::High]
+    let [low, high] = [LineLevel::Low, LineLevel::High]
         .map(|quiet| spent(lines, |level, length| level == quiet && length > octet).0);
     (low != high).then_some(low > high)
 }

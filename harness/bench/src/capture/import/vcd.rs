@@ -4,9 +4,9 @@
 //! names may share an identifier, and a file may end in the middle of a token where a program was stopped.
 
 use super::super::CaptureError;
-use super::levels::{Level, Levels, sample_time};
+use super::levels::{Levels, LineLevel, sample_time};
 use super::links::{ChannelRead, Signal};
-use super::numbers::{Time, units};
+use super::numbers::{SignedTime, units};
 use super::sigrok::frequency;
 use std::collections::HashMap;
 
@@ -77,15 +77,15 @@ struct VcdWire {
 }
 
 #[derive(Default)]
-struct Reader<'b> {
+struct VcdReader<'b> {
     wires: Vec<VcdWire>,
     /// The time between samples, which sigrok writes into a comment.
-    sample: Option<Time>,
+    sample: Option<SignedTime>,
     by_identifier: HashMap<&'b [u8], usize>,
     scopes: Vec<&'b [u8]>,
     /// Femtoseconds of a tick.
     tick: Option<i128>,
-    now: Time,
+    now: SignedTime,
     /// Whether a value has changed since the last time.
     changed: bool,
     /// Bits of a vector, of which the identifier follows.
@@ -117,7 +117,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Capt
         }
         _ => bytes,
     };
-    let mut reader = Reader::default();
+    let mut reader = VcdReader::default();
     let skipped = said(whole);
     let mut tokens = tokens(whole).skip_while(|(at, _)| *at < skipped);
     if !reader.header(&mut tokens)? {
@@ -146,7 +146,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Capt
     Ok((channels.collect(), notes))
 }
 
-impl<'b> Reader<'b> {
+impl<'b> VcdReader<'b> {
     /// Reads declarations; `false` where the file ends in them.
     fn header(
         &mut self,
@@ -263,7 +263,7 @@ impl<'b> Reader<'b> {
     }
 
     /// A time in ticks, with places where a writer has them.
-    fn at(&self, text: &str) -> Option<Time> {
+    fn at(&self, text: &str) -> Option<SignedTime> {
         let tick = self.tick.unwrap_or(1_000_000);
         let (whole, places) = text.split_once('.').unwrap_or((text, ""));
         let places = &places[..places.len().min(9)];
@@ -279,12 +279,12 @@ impl<'b> Reader<'b> {
         let femtoseconds = ticks.checked_mul(tick)?.checked_add(part)?;
         match femtoseconds % 1_000 {
             0 => units(femtoseconds / 1_000),
-            _ => Time::try_from((femtoseconds.checked_mul(3)? + 500_000) / 1_000_000).ok(),
+            _ => SignedTime::try_from((femtoseconds.checked_mul(3)? + 500_000) / 1_000_000).ok(),
         }
     }
 
     fn value(&mut self, at: usize, identifier: &[u8], level: u8) -> Result<(), CaptureError> {
-        let Some(level) = Level::of(level) else {
+        let Some(level) = LineLevel::of(level) else {
             let shown = char::from(level).escape_default();
             return Err(wrong(at, format!("`{shown}` is no level: 0, 1, x or z")));
         };

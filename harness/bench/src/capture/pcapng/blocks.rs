@@ -1,8 +1,8 @@
 //! The numbers and options of blocks.
 
-use super::{CaptureError, END, Reader};
+use super::{CaptureError, END, PcapngReader};
 
-impl Reader<'_> {
+impl PcapngReader<'_> {
     pub(super) fn take<const N: usize>(
         &self,
         offset: usize,

@@ -1,9 +1,9 @@
 //! What packets hold: octets, telegrams and frames.
 
 use super::interfaces::{Interface, Packets, Role};
-use super::parts::Part;
+use super::parts::InterfaceGroup;
 use super::values::sent;
-use super::{Byte, CaptureError, OCTET, Reader, StationOctet};
+use super::{Byte, CaptureError, OCTET, PcapngReader, StationOctet};
 use crate::capture::frames::{self, FrameRead, Sender};
 use crate::capture::order::Place;
 use crate::report::pcapng::{COMMENT, HEADER, LOST, RECEIVED, error_of};
@@ -38,7 +38,7 @@ pub(super) struct CookedFrame {
     place: Place,
 }
 
-impl Reader<'_> {
+impl PcapngReader<'_> {
     /// A packet that holds nothing that is read.
     pub(super) fn pass_over(&mut self, why: &'static str) {
         *self.passed.entry(why).or_default() += 1;
@@ -187,7 +187,7 @@ impl Reader<'_> {
         }
         if packets == Packets::Cooked2 {
             let number = self.take(packet.data + 4, end).map(u32::from_be_bytes)?;
-            part = self.part(Part::Frames(format!("interface {number}")));
+            part = self.part(InterfaceGroup::Frames(format!("interface {number}")));
         }
         let id = self.take(packet.data + header, end)?;
         self.cooked.push(CookedFrame {

@@ -1,7 +1,7 @@
 //! What an interface of a capture carries: by its link type, its name, and what the user says of it.
 
-use super::parts::Part;
-use super::{CaptureError, LINE, Reader};
+use super::parts::InterfaceGroup;
+use super::{CaptureError, LINE, PcapngReader};
 use crate::capture::frames::Sender;
 use crate::capture::{ChannelTarget, NamedLink, ends};
 use crate::report::pcapng::LINK_TYPE;
@@ -96,7 +96,7 @@ impl Role {
     }
 }
 
-impl Reader<'_> {
+impl PcapngReader<'_> {
     /// Adds an interface that is described at `start`; its name comes with the place of that.
     pub(in crate::capture) fn describe(
         &mut self,
@@ -121,9 +121,9 @@ impl Reader<'_> {
             let known = speed.and_then(|speed| u32::try_from(speed).ok());
             self.speed = self.speed.or(known.and_then(Rate::from_bits_per_second));
             let part = match carries {
-                Role::Link(..) => Part::Ring,
-                Role::Station(_) | Role::Frames(_) => Part::Stations,
-                Role::Line => Part::Line(text),
+                Role::Link(..) => InterfaceGroup::Ring,
+                Role::Station(_) | Role::Frames(_) => InterfaceGroup::Stations,
+                Role::Line => InterfaceGroup::Line(text),
             };
             (carries, part)
         } else {
@@ -133,8 +133,8 @@ impl Reader<'_> {
             self.bit_rate = self.bit_rate.or(rate);
             let sender = Sender::named(name);
             let part = match sender {
-                Sender::Known(_) => Part::Senders,
-                Sender::ByIdentifier => Part::Frames(name.to_owned()),
+                Sender::Known(_) => InterfaceGroup::Senders,
+                Sender::ByIdentifier => InterfaceGroup::Frames(name.to_owned()),
             };
             (Role::Frames(sender), part)
         };

@@ -4,7 +4,7 @@ use crate::capture::{CaptureError, ChannelTarget, NamedLink};
 
 /// What interfaces of a file belong together.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum InterfaceGroup {
     /// The links of a ring.
     Ring,
     /// The stations of a shared line.
@@ -17,7 +17,7 @@ pub(super) enum Part {
     Frames(String),
 }
 
-impl Part {
+impl InterfaceGroup {
     /// How `--link` names it.
     fn name(&self) -> &str {
         match self {
@@ -58,7 +58,7 @@ impl Part {
 /// # Errors
 /// None or several are chosen; several carry something and none is chosen.
 pub(super) fn chosen(
-    all: &[Part],
+    all: &[InterfaceGroup],
     carries: impl Fn(usize) -> bool,
     links: &[NamedLink],
 ) -> Result<usize, CaptureError> {
@@ -66,7 +66,12 @@ pub(super) fn chosen(
         place: "the capture".to_owned(),
         what,
     };
-    let known = || all.iter().map(Part::words).collect::<Vec<_>>().join(", ");
+    let known = || {
+        all.iter()
+            .map(InterfaceGroup::words)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let choice = links
         .iter()
         .find(|link| matches!(link.target, ChannelTarget::Ring | ChannelTarget::Bus));

@@ -1,13 +1,13 @@
 //! The statistics of an interface: when a capture began and ended.
 
 use super::super::{CaptureError, CaptureSpan};
-use super::{Reader, nanoseconds};
+use super::{PcapngReader, nanoseconds};
 use crate::report::pcapng::{ISB_ENDTIME, ISB_STARTTIME};
 use harness_proto::time::{Instant, Span};
 
 pub(super) use crate::report::pcapng::STATISTICS;
 
-impl Reader<'_> {
+impl PcapngReader<'_> {
     /// When the capture began and ended at an interface.
     pub(super) fn statistics(&mut self, start: usize, end: usize) -> Result<(), CaptureError> {
         let number = usize::try_from(self.u32(start, end)?).unwrap_or(usize::MAX);

@@ -39,7 +39,7 @@ pub struct FuzzCommands {
     /// `verify` of the folder of a run; `None` if the folder has no run of this bus.
     pub verify: Verify,
     /// `fuzz power`, where the bus has it.
-    pub power: Option<Power>,
+    pub power: Option<PowerRun>,
     /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
     pub page: Option<Page>,
 }
@@ -48,7 +48,7 @@ pub struct FuzzCommands {
 type Page = fn(&Path) -> Result<String, ExploreError>;
 
 /// Counts the cases that it takes to find each deviation.
-type Power = fn(&PowerArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>;
+type PowerRun = fn(&PowerArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>;
 
 /// Judges the findings of a run again.
 type Verify = fn(&Path, Option<Signer<'_>>, &mut Output) -> Option<std::io::Result<Exit>>;

@@ -4,7 +4,7 @@ use super::clock::AdapterClock;
 use crate::frames::slcan::{self, STAMP_PERIOD, SlcanCommand, flags};
 use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
 use crate::medium::Pieces;
-use crate::port::Parts;
+use crate::port::WireParts;
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_socketcan::{Report, decode_error};
@@ -73,7 +73,7 @@ impl Adapter {
     }
 
     /// How frames are written, beside the conversation.
-    pub(super) fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> WireParts {
         match self {
             Self::Slcan(_) => {
                 |pieces| written(pieces, |frame, out| SlcanCommand::Send(frame).write(out))
@@ -148,7 +148,7 @@ pub(super) const fn closing(silenced: bool) -> &'static [SlcanCommand] {
 /// An SLCAN adapter whose channel is open.
 #[derive(Debug)]
 pub(super) struct Slcan {
-    lines: slcan::Lines,
+    lines: slcan::SlcanLines,
     clock: AdapterClock,
     /// Commands that wait for an answer, and since when.
     unanswered: VecDeque<(SlcanCommand, Instant)>,
@@ -170,7 +170,7 @@ impl Slcan {
     pub(super) fn new(listen_only: bool, answers: bool, silenced: bool) -> Self {
         let period = Span::from_millis(STAMP_PERIOD.into());
         Self {
-            lines: slcan::Lines::default(),
+            lines: slcan::SlcanLines::default(),
             clock: AdapterClock::new(Span::from_millis(1), Some(period)),
             unanswered: VecDeque::new(),
             status: answers.then_some(Instant::START),

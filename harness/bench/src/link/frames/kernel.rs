@@ -2,7 +2,7 @@
 
 use super::adapter::Event;
 use super::open::{AdapterError, AdapterSettings, Listening};
-use super::transport::Transport;
+use super::transport::FrameTransport;
 use crate::port::LastWords;
 use crate::trouble::Trouble;
 use harness_proto::can::{BitRate, Frame};
@@ -138,7 +138,7 @@ fn fits(name: &str, state: &State, settings: &AdapterSettings) -> Result<Listeni
     }
 }
 
-impl Transport for Kernel {
+impl FrameTransport for Kernel {
     fn name(&self) -> &str {
         &self.name
     }
@@ -345,7 +345,7 @@ mod tests {
         back: bool,
     }
 
-    impl Transport for Short {
+    impl FrameTransport for Short {
         fn name(&self) -> &str {
             "can0"
         }

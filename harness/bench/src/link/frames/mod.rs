@@ -31,7 +31,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time;
-use transport::Transport;
+use transport::FrameTransport;
 
 /// How far ahead of the bus frames are handed to the adapter.
 const AHEAD: Span = Span::from_millis(2);
@@ -67,7 +67,7 @@ impl Reports {
 /// A link over a CAN adapter, with one port.
 #[derive(Debug)]
 pub struct FrameLink {
-    transport: Box<dyn Transport>,
+    transport: Box<dyn FrameTransport>,
     rate: BitRate,
     listen_only: bool,
     listening: Listening,
@@ -116,7 +116,7 @@ impl FrameLink {
     }
 
     fn over(
-        transport: Box<dyn Transport>,
+        transport: Box<dyn FrameTransport>,
         settings: &AdapterSettings,
         senders: Vec<(can::Id, u8)>,
         interrupt: Arc<AtomicBool>,

@@ -3,7 +3,7 @@
 use super::adapter::{Adapter, Socketcand};
 use super::kernel::Kernel;
 use super::talk::Talk;
-use super::transport::Transport;
+use super::transport::FrameTransport;
 use crate::frames::slcan::{BitTiming, SlcanCommand, rate_of};
 use crate::port::{OpenError, PortAddress, open_adapter};
 use crate::trouble::Trouble;
@@ -167,7 +167,7 @@ pub enum AdapterError {
 pub(super) fn open(
     settings: &AdapterSettings,
     interrupt: &AtomicBool,
-) -> Result<(Box<dyn Transport>, Listening), AdapterError> {
+) -> Result<(Box<dyn FrameTransport>, Listening), AdapterError> {
     match &settings.place {
         AdapterPlace::Slcan { at, baud } => {
             let commands = rate_commands(settings.rate)?;

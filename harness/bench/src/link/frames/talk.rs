@@ -2,7 +2,7 @@
 
 use super::adapter::{Adapter, Slcan, closing};
 use super::open::{AdapterError, AdapterSettings, Listening};
-use super::transport::{Stream, Transport};
+use super::transport::{FrameTransport, StreamTransport};
 use crate::frames::BadMessage;
 use crate::frames::slcan::{self, Report, SlcanCommand};
 use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
@@ -45,7 +45,7 @@ const OPEN: &str = "check that no other program uses it";
 pub(super) struct Talk<'a> {
     wire: Wire,
     interrupt: &'a AtomicBool,
-    lines: slcan::Lines,
+    lines: slcan::SlcanLines,
     messages: Messages,
     /// Characters received and not yet examined.
     come: VecDeque<u8>,
@@ -66,7 +66,7 @@ impl<'a> Talk<'a> {
         Self {
             wire,
             interrupt,
-            lines: slcan::Lines::default(),
+            lines: slcan::SlcanLines::default(),
             messages: Messages::default(),
             come: VecDeque::new(),
             name: String::new(),
@@ -77,8 +77,8 @@ impl<'a> Talk<'a> {
         }
     }
 
-    pub(super) fn opened(self, adapter: Adapter) -> Box<dyn Transport> {
-        Box::new(Stream {
+    pub(super) fn opened(self, adapter: Adapter) -> Box<dyn FrameTransport> {
+        Box::new(StreamTransport {
             wire: self.wire,
             adapter,
             come: self.come,

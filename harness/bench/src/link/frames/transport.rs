@@ -12,7 +12,7 @@ use std::fmt;
 use std::io;
 
 /// The way to an open CAN adapter. Times are those of the adapter's clock, which begins when it is opened.
-pub(super) trait Transport: fmt::Debug + Send {
+pub(super) trait FrameTransport: fmt::Debug + Send {
     /// Where it leads, as the rig's file says it.
     fn name(&self) -> &str;
     /// Its descriptor, for locks.
@@ -46,14 +46,14 @@ pub(super) trait Transport: fmt::Debug + Send {
 }
 
 #[derive(Debug)]
-pub(super) struct Stream {
+pub(super) struct StreamTransport {
     pub(super) wire: Wire,
     pub(super) adapter: Adapter,
     /// What the opening has read after the last answer.
     pub(super) come: VecDeque<u8>,
 }
 
-impl Stream {
+impl StreamTransport {
     fn put(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
         let mut bytes = bytes.iter();
         bytes.try_for_each(|byte| self.wire.send(Outgoing::Byte(*byte)))?;
@@ -61,7 +61,7 @@ impl Stream {
     }
 }
 
-impl Drop for Stream {
+impl Drop for StreamTransport {
     fn drop(&mut self) {
         let mut close = Vec::new();
         self.adapter.close(&mut close);
@@ -70,7 +70,7 @@ impl Drop for Stream {
     }
 }
 
-impl Transport for Stream {
+impl FrameTransport for StreamTransport {
     fn name(&self) -> &str {
         self.wire.name()
     }

@@ -7,7 +7,7 @@ const DAMAGED: u8 = 250;
 
 /// A drive that holds a number, which counts up each scan while it runs, and says it where it is asked.
 #[derive(Clone, Debug, Default)]
-struct Counter {
+struct CountingDrive {
     scans: u64,
     runs: bool,
     number: u8,
@@ -21,7 +21,7 @@ struct Counter {
 }
 
 /// 0 asks, 1 starts, 2 stops, 3 makes it wander; a higher number is set. 200 asks where a stream parts it.
-impl RightDrive for Counter {
+impl RightDrive for CountingDrive {
     type Piece = u8;
     const SCAN: Span = Span::from_millis(1);
 
@@ -98,9 +98,9 @@ fn judged_with(
     came: &[(u64, u8)],
     most_lost: usize,
 ) -> Judged<u8> {
-    let drive = Counter {
+    let drive = CountingDrive {
         alarm,
-        ..Counter::default()
+        ..CountingDrive::default()
     };
     judge(vec![drive], &dialogue(sent, came, most_lost))
 }
@@ -196,7 +196,7 @@ fn a_line_loses_damages_and_parts_pieces() {
     let places = |sent: &[(u64, u8)], came: &[(u64, u8)]| {
         let mut talk = dialogue(sent, came, 2);
         (talk.loses_sent, talk.complete) = (true, true);
-        lost(Counter::default(), &talk, &|| ()).ok()
+        lost(CountingDrive::default(), &talk, &|| ()).ok()
     };
     let sent = [(10, 7), (30, 8), (50, 0), (70, 0)];
     assert_eq!(places(&sent, &[(52, 8), (72, 8)]), Some(vec![]));
@@ -221,12 +221,12 @@ fn an_answer_is_read_behind_its_question() {
         );
         talk.asked = asked.to_vec();
         talk.most_lost = 0;
-        judge(vec![Counter::default()], &talk)
+        judge(vec![CountingDrive::default()], &talk)
     };
     assert_ne!(judged(&[4, 4]), Judged::Right);
     let one = |asked| {
         let talk = dialogue(&[(10, 7), (11, 0), (12, 8)], &[(12, 7)], 0);
-        judge(vec![Counter::default()], &Dialogue { asked, ..talk })
+        judge(vec![CountingDrive::default()], &Dialogue { asked, ..talk })
     };
     assert_eq!(one(vec![2]), Judged::Right);
     assert_ne!(one(vec![1]), Judged::Right);

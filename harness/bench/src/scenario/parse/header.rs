@@ -60,7 +60,7 @@ pub fn parse_step<L: Language>(source: &Source) -> Result<Step<L>, Problems> {
 /// # Errors
 /// As of [`parse`].
 pub fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<L>, Problems> {
-    let mut reader = Reader::<L>::new();
+    let mut reader = ScenarioReader::<L>::new();
     let mut offset = 0;
     for (number, line) in source.text.split('\n').enumerate() {
         if number == MAX_LINES {
@@ -86,7 +86,7 @@ pub fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<L>, Pro
         .map_err(|problems| Problems::new(&source.name, source.text.clone(), problems))
 }
 
-struct Reader<L: Language> {
+struct ScenarioReader<L: Language> {
     title: Option<String>,
     sources: Vec<Citation>,
     bus: Option<Spanned<BusName>>,
@@ -98,7 +98,7 @@ struct Reader<L: Language> {
     problems: Vec<Problem>,
 }
 
-impl<L: Language> Reader<L> {
+impl<L: Language> ScenarioReader<L> {
     fn new() -> Self {
         Self {
             title: None,

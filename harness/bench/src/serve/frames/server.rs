@@ -30,7 +30,7 @@ const AFTERWARDS: Span = Span::from_millis(1_000);
 #[derive(Debug)]
 pub struct FrameServer<B> {
     bus: B,
-    seats: Vec<Seat>,
+    seats: Vec<StationSeat>,
     /// The bus's time `base.1` is the clock's time `base.0`.
     base: (Instant, Instant),
     clock: Instant,
@@ -39,7 +39,7 @@ pub struct FrameServer<B> {
 }
 
 #[derive(Debug, Default)]
-struct Seat {
+struct StationSeat {
     client: Option<Client>,
     /// Whether it is a station of the bus.
     joined: bool,
@@ -68,7 +68,7 @@ impl<B: SharedBus> FrameServer<B> {
         }
         Self {
             base: (Instant::START, bus.now()),
-            seats: (0..MOST_CLIENTS).map(|_| Seat::default()).collect(),
+            seats: (0..MOST_CLIENTS).map(|_| StationSeat::default()).collect(),
             clock: Instant::START,
             started,
             bus,
@@ -87,7 +87,7 @@ impl<B: SharedBus> FrameServer<B> {
 
     /// A client comes, and gets a number; `None` while there is no place for it.
     pub fn come(&mut self, protocol: Protocol) -> Option<usize> {
-        let free = |seat: &Seat| seat.client.is_none() && !seat.joined;
+        let free = |seat: &StationSeat| seat.client.is_none() && !seat.joined;
         let number = self.seats.iter().position(free)?;
         let session = Session::new(protocol, self.bus.rate(), self.started);
         let mut greeting = Vec::new();

@@ -54,7 +54,7 @@ pub(super) enum Act {
 
 #[derive(Clone, Debug)]
 pub(super) enum Session {
-    Slcan(Adapter),
+    Slcan(ServedAdapter),
     Socketcand(Daemon),
 }
 
@@ -62,7 +62,7 @@ impl Session {
     /// A conversation about a bus with this rate. `started` is when its time began, since 1970.
     pub(super) fn new(protocol: Protocol, rate: BitRate, started: Duration) -> Self {
         match protocol {
-            Protocol::Slcan => Self::Slcan(Adapter::new(rate)),
+            Protocol::Slcan => Self::Slcan(ServedAdapter::new(rate)),
             Protocol::Socketcand => Self::Socketcand(Daemon::new(started)),
         }
     }
@@ -104,8 +104,8 @@ impl Session {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Adapter {
-    lines: slcan::Lines,
+pub(super) struct ServedAdapter {
+    lines: slcan::SlcanLines,
     bus: BitRate,
     /// The rate that the client has chosen; `None` takes that of the bus.
     rate: Option<BitRate>,
@@ -124,10 +124,10 @@ enum Channel {
     OffRate(usize),
 }
 
-impl Adapter {
+impl ServedAdapter {
     fn new(bus: BitRate) -> Self {
         Self {
-            lines: slcan::Lines::default(),
+            lines: slcan::SlcanLines::default(),
             bus,
             rate: None,
             channel: Channel::Closed,

@@ -4,10 +4,10 @@ use super::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
 use crate::counted::counted;
 use crate::port::wake_on_time;
 use crate::serve::ServedAt;
-use crate::serve::arrival::Client;
+use crate::serve::arrival::ClientStream;
 use crate::serve::clock::Clock;
 use crate::serve::control_stream::ControlStream;
-use crate::serve::pty::{Change, Pty};
+use crate::serve::pty::{Pty, PtyEvent};
 use crate::serve::shell::{EndRequest, ServeEnd, ServeError, ServeHost, ServeOptions};
 use crate::serve::stage::Stage;
 use crate::serve::tcp::Listener;
@@ -45,7 +45,7 @@ pub fn serve_frames<B: SharedBus>(
             }
             ServedAt::Pty(path) => seats.push(Seat {
                 protocol: *protocol,
-                end: Stream::Pty(Pty::open(path)?),
+                end: SeatStream::Pty(Pty::open(path)?),
                 client: None,
                 name: String::new(),
                 wrong: false,
@@ -63,7 +63,7 @@ pub fn serve_frames<B: SharedBus>(
         .map(|place| Stage::open(place, options.allow_remote, bus.live()))
         .transpose()?;
     let started = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
-    let mut shell = Shell {
+    let mut shell = FrameShell {
         clock: Clock::start(),
         server: FrameServer::new(bus, started),
         doors,
@@ -82,7 +82,7 @@ pub fn serve_frames<B: SharedBus>(
 /// A place for a client: a pseudo terminal, or an accepted connection.
 struct Seat {
     protocol: Protocol,
-    end: Stream,
+    end: SeatStream,
     /// Its number with the server, while a client is here.
     client: Option<usize>,
     /// What the client is called.
@@ -93,12 +93,12 @@ struct Seat {
     losing: bool,
 }
 
-enum Stream {
-    Tcp(Client),
+enum SeatStream {
+    Tcp(ClientStream),
     Pty(Pty),
 }
 
-struct Shell<'a, B> {
+struct FrameShell<'a, B> {
     server: FrameServer<B>,
     doors: Vec<(Protocol, Listener)>,
     seats: Vec<Seat>,
@@ -112,7 +112,7 @@ struct Shell<'a, B> {
     gone: bool,
 }
 
-impl<B: SharedBus> Shell<'_, B> {
+impl<B: SharedBus> FrameShell<'_, B> {
     /// One line for each place, once all of them are ready.
     fn announce(&mut self) -> Result<(), ServeError> {
         let about = self.server.about();
@@ -123,7 +123,7 @@ impl<B: SharedBus> Shell<'_, B> {
             lines.push(format!("{}: {about} at {address}", protocol.name()));
         }
         for seat in &self.seats {
-            if let Stream::Pty(pty) = &seat.end {
+            if let SeatStream::Pty(pty) = &seat.end {
                 let place = pty.link().display();
                 lines.push(format!("{}: {about} at {place}", seat.protocol.name()));
             }
@@ -162,7 +162,8 @@ impl<B: SharedBus> Shell<'_, B> {
                 }
             }
             // A connection that has ended leaves its place.
-            let stays = |seat: &Seat| seat.client.is_some() || matches!(seat.end, Stream::Pty(_));
+            let stays =
+                |seat: &Seat| seat.client.is_some() || matches!(seat.end, SeatStream::Pty(_));
             self.seats.retain(stays);
             if ready && let Some(control) = &mut self.control {
                 let bus = self.server.bus();
@@ -194,8 +195,8 @@ impl<B: SharedBus> Shell<'_, B> {
             stream.set(PollFlags::IN, room);
             stream.set(PollFlags::OUT, waits);
             match &seat.end {
-                Stream::Tcp(client) => fds.push(PollFd::new(client, stream)),
-                Stream::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
+                SeatStream::Tcp(client) => fds.push(PollFd::new(client, stream)),
+                SeatStream::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
             }
         }
         fds.extend(self.control.iter().flat_map(ControlStream::polls));
@@ -220,7 +221,7 @@ impl<B: SharedBus> Shell<'_, B> {
             for (client, address) in came {
                 self.seats.push(Seat {
                     protocol,
-                    end: Stream::Tcp(client),
+                    end: SeatStream::Tcp(client),
                     client: None,
                     name: format!("client {address}"),
                     wrong: false,
@@ -259,7 +260,7 @@ impl<B: SharedBus> Shell<'_, B> {
         match (self.hear(seat), &mut self.seats[seat].end) {
             (Err(error), _) => self.fail(seat, &error),
             // Keeps the client's place until its input is drained.
-            (Ok(true), Stream::Pty(pty)) => {
+            (Ok(true), SeatStream::Pty(pty)) => {
                 if let Some(change) = pty.change() {
                     self.change(seat, change);
                 }
@@ -270,7 +271,7 @@ impl<B: SharedBus> Shell<'_, B> {
 
     /// Handles a failed stream. A connection has ended. At a pseudo terminal no client is left, which its hang-up shows.
     fn fail(&mut self, seat: usize, error: &io::Error) {
-        if matches!(self.seats[seat].end, Stream::Tcp(_)) {
+        if matches!(self.seats[seat].end, SeatStream::Tcp(_)) {
             let why = match error.kind() {
                 io::ErrorKind::UnexpectedEof => String::new(),
                 _ => format!(" ({error})"),
@@ -280,15 +281,15 @@ impl<B: SharedBus> Shell<'_, B> {
     }
 
     /// Handles a client that opens or closes a pseudo terminal.
-    fn change(&mut self, seat: usize, change: Change) {
+    fn change(&mut self, seat: usize, change: PtyEvent) {
         match change {
-            Change::Came => self.come_to_terminal(seat),
-            Change::Gone => {
+            PtyEvent::Came => self.come_to_terminal(seat),
+            PtyEvent::Gone => {
                 // Reads what the client sent last. An error only means that no client is left.
                 let _read = self.hear(seat);
                 let another = match &mut self.seats[seat].end {
-                    Stream::Pty(pty) => pty.gone(),
-                    Stream::Tcp(_) => false,
+                    SeatStream::Pty(pty) => pty.gone(),
+                    SeatStream::Tcp(_) => false,
                 };
                 self.go(seat, "has gone");
                 if another {
@@ -299,7 +300,7 @@ impl<B: SharedBus> Shell<'_, B> {
     }
 
     fn come_to_terminal(&mut self, seat: usize) {
-        if let Stream::Pty(pty) = &self.seats[seat].end {
+        if let SeatStream::Pty(pty) = &self.seats[seat].end {
             self.seats[seat].name = format!("client at {}", pty.link().display());
         }
         self.come(seat);
@@ -330,8 +331,10 @@ impl<B: SharedBus> Shell<'_, B> {
                 return Ok(false);
             }
             let read = match &mut self.seats[seat].end {
-                Stream::Tcp(client) => client.read(&mut buffer[..room]),
-                Stream::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
+                SeatStream::Tcp(client) => client.read(&mut buffer[..room]),
+                SeatStream::Pty(pty) => {
+                    pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO))
+                }
             };
             let (read, ago) = match read {
                 Ok((0, _)) => return Err(io::ErrorKind::UnexpectedEof.into()),
@@ -341,8 +344,8 @@ impl<B: SharedBus> Shell<'_, B> {
                 Err(error) => return Err(error),
             };
             let news = match &mut self.seats[seat].end {
-                Stream::Pty(pty) => pty.heard(),
-                Stream::Tcp(_) => false,
+                SeatStream::Pty(pty) => pty.heard(),
+                SeatStream::Tcp(_) => false,
             };
             if news {
                 self.come_to_terminal(seat);
@@ -374,8 +377,8 @@ impl<B: SharedBus> Shell<'_, B> {
             }
             let before = std::time::Instant::now();
             let written = match &mut self.seats[seat].end {
-                Stream::Tcp(client) => client.write(bytes),
-                Stream::Pty(pty) => pty.write(bytes),
+                SeatStream::Tcp(client) => client.write(bytes),
+                SeatStream::Pty(pty) => pty.write(bytes),
             };
             match written {
                 Ok(written) => {
