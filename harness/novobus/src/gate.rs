@@ -36,7 +36,7 @@ pub(crate) struct RingGate {
 }
 
 /// What is to be done about a fault.
-enum Verdict {
+enum FaultVerdict {
     /// It changes no byte: at most an error is noticed.
     Harmless,
     /// A byte that the master sends arrives with these data bits inverted, and with an error.
@@ -89,32 +89,36 @@ impl RingGate {
     }
 
     /// What a fault may do to the bytes that drives hear.
-    fn verdict(&self, fault: PlacedFault, moment: Moment, settled: bool) -> Verdict {
+    fn verdict(&self, fault: PlacedFault, moment: Moment, settled: bool) -> FaultVerdict {
         match fault {
-            PlacedFault::Stimulus(..) | PlacedFault::Drive(_, DriveFault::Off) => Verdict::Harmless,
+            PlacedFault::Stimulus(..) | PlacedFault::Drive(_, DriveFault::Off) => {
+                FaultVerdict::Harmless
+            }
             PlacedFault::Link(link, LinkFault::Flip(flips)) if flips.noticed().is_some() => {
                 match moment {
-                    _ if flips.data == 0 => Verdict::Harmless,
+                    _ if flips.data == 0 => FaultVerdict::Harmless,
                     Moment::Byte(byte) if link == 0 && byte > self.sent => {
                         let data = flips.data;
-                        Verdict::Damages { byte, data }
+                        FaultVerdict::Damages { byte, data }
                     }
                     Moment::Now if link == 0 && settled => {
                         let (byte, data) = (self.sent + 1, flips.data);
-                        Verdict::Damages { byte, data }
+                        FaultVerdict::Damages { byte, data }
                     }
-                    _ => Verdict::Open,
+                    _ => FaultVerdict::Open,
                 }
             }
             // What a cut link has lost matters when it is joined again, at the latest by the next conversation.
-            PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => Verdict::Harmless,
+            PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => FaultVerdict::Harmless,
             // Bytes are lost on the way: drives that nothing tells of it are out of step.
             PlacedFault::Drive(_, DriveFault::On) | PlacedFault::Link(_, LinkFault::Join)
                 if settled =>
             {
-                Verdict::Doubt
+                FaultVerdict::Doubt
             }
-            PlacedFault::Link(..) | PlacedFault::Frame(_) | PlacedFault::Drive(..) => Verdict::Open,
+            PlacedFault::Link(..) | PlacedFault::Frame(_) | PlacedFault::Drive(..) => {
+                FaultVerdict::Open
+            }
         }
     }
 }
@@ -166,13 +170,15 @@ impl Gate for RingGate {
             return Ok(());
         }
         match self.verdict(fault, moment, settled) {
-            Verdict::Harmless => self.cut |= matches!(fault, PlacedFault::Link(_, LinkFault::Cut)),
-            Verdict::Damages { byte, data } => *self.damaged.entry(byte).or_default() ^= data,
-            Verdict::Doubt => {
+            FaultVerdict::Harmless => {
+                self.cut |= matches!(fault, PlacedFault::Link(_, LinkFault::Cut))
+            }
+            FaultVerdict::Damages { byte, data } => *self.damaged.entry(byte).or_default() ^= data,
+            FaultVerdict::Doubt => {
                 self.guard.doubt();
                 self.guard.forget();
             }
-            Verdict::Open => {
+            FaultVerdict::Open => {
                 let why = format!(
                     "ring {}: the fault `{fault}` is not made: what drives take changed or lost bytes for cannot be \
                      judged, so it needs everything allowed in the rig's [limits], --allow-motion, and no `max_speed`",

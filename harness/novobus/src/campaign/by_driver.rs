@@ -1,7 +1,7 @@
 //! A conversation of the driver: its master packs telegrams, compares every byte, names the fault and repairs the ring
 //! (`bus`, ND21 11.5). What it reports is taken for what it knows.
 
-use super::class::{CaseEvidence, Wrong, named};
+use super::class::{CaseEvidence, WrongValue, named};
 use super::sound::Sound;
 use crate::campaign::fault::CaseFaults;
 use crate::driver::{Axis, Error, OpenRings, Options};
@@ -20,7 +20,7 @@ const QUIET: u16 = 0xFD90;
 
 /// The conversation without a fault before one of its steps: all bytes are back, so every link has carried as many.
 #[derive(Clone, Debug)]
-struct Before {
+struct UndisturbedStep {
     link: SimulatedLink,
     /// How many bytes the master has sent.
     sent: u64,
@@ -32,7 +32,7 @@ struct Before {
 #[derive(Clone, Debug)]
 pub(crate) struct ByDriver {
     /// The conversation before each step: a case begins before the step of its first fault.
-    before: Vec<Before>,
+    before: Vec<UndisturbedStep>,
     calls: Vec<Vec<(u8, PlannedCall)>>,
     sound: Sound,
     /// What the jobs bring without a fault.
@@ -73,7 +73,7 @@ impl ByDriver {
         };
         let mut before = Vec::new();
         let note = |link: &RecordingLink, answers: &[_]| {
-            before.push(Before {
+            before.push(UndisturbedStep {
                 link: link.link.clone(),
                 sent: link.sent.len() as u64,
                 answers: answers.to_vec(),
@@ -153,7 +153,7 @@ impl ByDriver {
                 && value != expected
             {
                 let drive = *drive;
-                evidence.wrong.push(Wrong::Answer {
+                evidence.wrong.push(WrongValue::Answer {
                     drive,
                     value,
                     expected,

@@ -2,7 +2,7 @@
 //! expected ones, continues with SYNCO, reads the number of the drive that the ring spells out, sends the check sequence and repeats the
 //! incomplete telegrams.
 
-use super::class::{CaseEvidence, Wrong};
+use super::class::{CaseEvidence, WrongValue};
 use super::conversation::Answers;
 use super::sound::{DrivesBeyondBus, Sound};
 use crate::campaign::fault::CaseFaults;
@@ -24,7 +24,7 @@ const SPELLING_AFTER_SILENCE: usize = SPELLING + 150;
 
 /// What the master sent, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct SentBytes {
+pub(crate) struct MasterBytes {
     pub why: &'static str,
     pub bytes: Vec<u8>,
 }
@@ -58,7 +58,7 @@ impl Wire for SimulatedLink {
 struct Play<'a, W> {
     of: &'a ByManual,
     wire: W,
-    said: Vec<SentBytes>,
+    said: Vec<MasterBytes>,
     evidence: CaseEvidence,
     /// For how many byte times the faults last.
     lasts: usize,
@@ -119,7 +119,7 @@ impl ByManual {
 
     /// Plays a case on a ring of its own, from the start.
     #[must_use]
-    pub(crate) fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<SentBytes>) {
+    pub(crate) fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<MasterBytes>) {
         let mut link = self.start.clone();
         for fault in case.faults() {
             for (distance, what) in fault.what.on_link() {
@@ -161,14 +161,14 @@ impl ByManual {
         wire: impl Wire,
         heard: Vec<Received>,
         lasts: usize,
-    ) -> (CaseEvidence, Vec<SentBytes>) {
+    ) -> (CaseEvidence, Vec<MasterBytes>) {
         let fill = vec![SYNCO; self.fill(lasts) + self.spelling];
         let mut play = Play {
             of: self,
             wire,
             said: vec![
-                SentBytes::new("the conversation", self.answers.sent.clone()),
-                SentBytes::new("SYNCO, while the ring spells out an address (9.7)", fill),
+                MasterBytes::new("the conversation", self.answers.sent.clone()),
+                MasterBytes::new("SYNCO, while the ring spells out an address (9.7)", fill),
             ],
             evidence: CaseEvidence::default(),
             lasts,
@@ -179,7 +179,7 @@ impl ByManual {
     }
 }
 
-impl SentBytes {
+impl MasterBytes {
     fn new(why: &'static str, bytes: Vec<u8>) -> Self {
         Self { why, bytes }
     }
@@ -187,7 +187,7 @@ impl SentBytes {
 
 impl<W: Wire> Play<'_, W> {
     /// Sends all of it without a gap.
-    fn say(&mut self, said: impl IntoIterator<Item = SentBytes>) -> Vec<Received> {
+    fn say(&mut self, said: impl IntoIterator<Item = MasterBytes>) -> Vec<Received> {
         let from = self.said.len();
         self.said.extend(said);
         let bytes: Vec<_> = self.said[from..]
@@ -198,8 +198,8 @@ impl<W: Wire> Play<'_, W> {
     }
 
     /// SYNCO until what was sent before has come back, however late, and some more.
-    fn synco(&self, more: usize) -> SentBytes {
-        SentBytes::new("SYNCO", vec![SYNCO; self.of.fill(self.lasts) + more])
+    fn synco(&self, more: usize) -> MasterBytes {
+        MasterBytes::new("SYNCO", vec![SYNCO; self.of.fill(self.lasts) + more])
     }
 
     /// Goes on behind the opening, for which this came back.
@@ -222,7 +222,7 @@ impl<W: Wire> Play<'_, W> {
         // Something is left that only the next telegrams can show.
         let why = "the conversation once more, without a fault";
         let fill = self.synco(self.of.spelling);
-        let heard = self.say([SentBytes::new(why, answers.sent.clone()), fill]);
+        let heard = self.say([MasterBytes::new(why, answers.sent.clone()), fill]);
         let heard = behind_synco(&heard, &answers.sent);
         if let Some(wrong) = answers.wrong(heard, 0) {
             self.evidence.confirmed = false;
@@ -255,8 +255,8 @@ impl<W: Wire> Play<'_, W> {
             self.evidence.sequences += 1;
             let repeated = self.of.answers.sent[restart..].to_vec();
             let heard = self.say([
-                SentBytes::new("the check sequence (9.8)", CHECK_SEQUENCE.to_vec()),
-                SentBytes::new("the telegrams that were not completed, repeated", repeated),
+                MasterBytes::new("the check sequence (9.8)", CHECK_SEQUENCE.to_vec()),
+                MasterBytes::new("the telegrams that were not completed, repeated", repeated),
                 self.synco(1),
             ]);
             let is_sequence = |bytes: &[Received]| {
@@ -275,7 +275,7 @@ impl<W: Wire> Play<'_, W> {
     }
 
     /// Cells with wrong contents, and data that differed.
-    fn wrong_values(&self) -> Vec<Wrong> {
+    fn wrong_values(&self) -> Vec<WrongValue> {
         let mut wrong = self.of.sound.wrong(&self.wire, self.evidence.confirmed);
         if !self.evidence.confirmed {
             return wrong;
@@ -285,7 +285,7 @@ impl<W: Wire> Play<'_, W> {
             if let (Some(received), Some(expected)) = both
                 && received != expected
             {
-                wrong.push(Wrong::Answer {
+                wrong.push(WrongValue::Answer {
                     drive,
                     value: received.byte.into(),
                     expected: expected.byte.into(),

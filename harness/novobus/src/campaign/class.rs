@@ -107,7 +107,7 @@ impl fmt::Display for CaseClass {
 
 /// A value that is wrong when everything is over.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Wrong {
+pub(crate) enum WrongValue {
     /// A cell of a drive.
     Cell {
         drive: u8,
@@ -143,7 +143,7 @@ pub(crate) struct CaseEvidence {
     /// Whether no drive is in the error mode.
     pub all_back: bool,
     /// What is wrong at the end, in order.
-    pub wrong: Vec<Wrong>,
+    pub wrong: Vec<WrongValue>,
 }
 
 impl CaseEvidence {
@@ -193,7 +193,7 @@ mod tests {
     /// Every combination of what can be seen is one class or a contradiction, and nothing else decides.
     #[test]
     fn classes_exclude_each_other() {
-        let wrong = Wrong::Answer {
+        let wrong = WrongValue::Answer {
             drive: 0,
             value: 1,
             expected: 2,

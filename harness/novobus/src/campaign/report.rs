@@ -1,6 +1,6 @@
 //! The results of a campaign, for people and for tools.
 
-use super::class::{CaseClass, CaseEvidence, Wrong};
+use super::class::{CaseClass, CaseEvidence, WrongValue};
 use crate::campaign::run::{CaseOutcome, PlayedCampaign};
 use harness_bench::campaign::PlayedCampaign as _;
 use harness_bench::campaign::share::counts;
@@ -16,7 +16,7 @@ pub(crate) const WORST: usize = 10;
 /// How many wrong values a line shows.
 const VALUES: usize = 4;
 
-impl fmt::Display for Wrong {
+impl fmt::Display for WrongValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Cell {
@@ -61,7 +61,13 @@ pub(crate) fn happened(evidence: &CaseEvidence, drives: u8) -> String {
     if !evidence.confirmed {
         parts.push("a job not confirmed".to_owned());
     }
-    parts.extend(evidence.wrong.iter().take(VALUES).map(Wrong::to_string));
+    parts.extend(
+        evidence
+            .wrong
+            .iter()
+            .take(VALUES)
+            .map(WrongValue::to_string),
+    );
     if evidence.wrong.len() > VALUES {
         parts.push(format!("{} more", evidence.wrong.len() - VALUES));
     }
@@ -152,10 +158,10 @@ struct JsonWrong {
     expected: u32,
 }
 
-impl From<&Wrong> for JsonWrong {
-    fn from(wrong: &Wrong) -> Self {
+impl From<&WrongValue> for JsonWrong {
+    fn from(wrong: &WrongValue) -> Self {
         match *wrong {
-            Wrong::Cell {
+            WrongValue::Cell {
                 drive,
                 address,
                 value,
@@ -167,7 +173,7 @@ impl From<&Wrong> for JsonWrong {
                 value: value.into(),
                 expected: expected.into(),
             },
-            Wrong::Answer {
+            WrongValue::Answer {
                 drive,
                 value,
                 expected,

@@ -4,7 +4,7 @@ use super::fault::CaseFaults;
 use super::file::{CampaignFile, read};
 use super::plan::{Shape, cases};
 use crate::campaign::by_driver::ByDriver;
-use crate::campaign::by_manual::{ByManual, SentBytes};
+use crate::campaign::by_manual::{ByManual, MasterBytes};
 use crate::campaign::class::{CaseClass, CaseEvidence};
 use crate::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::campaign::sharing::Sharing;
@@ -234,7 +234,7 @@ impl Campaign {
     pub(crate) fn play(
         &self,
         case: &CaseFaults,
-    ) -> Result<(CaseOutcome, Vec<SentBytes>), Contradiction> {
+    ) -> Result<(CaseOutcome, Vec<MasterBytes>), Contradiction> {
         let (evidence, said) = match &self.played {
             ReadyConversation::ByManual(by_manual) => by_manual.play(case),
             ReadyConversation::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),

@@ -1,6 +1,6 @@
 //! Compares the cells of a ring with those of the same ring without a fault.
 
-use super::class::Wrong;
+use super::class::WrongValue;
 use crate::link::SimulatedLink;
 use harness_bench::link::Link;
 use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
@@ -81,7 +81,7 @@ impl Sound {
 
     /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
     #[must_use]
-    pub(crate) fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<Wrong> {
+    pub(crate) fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<WrongValue> {
         let mut wrong = Vec::new();
         for drive in 0..now.count() {
             let Some(sound) = self.end.cells(drive) else {
@@ -98,7 +98,7 @@ impl Sound {
                 let value = cells.peek(address);
                 let held = self.history.get(&(drive, address));
                 if confirmed || held.is_none_or(|values| !values.contains(&value)) {
-                    wrong.push(Wrong::Cell {
+                    wrong.push(WrongValue::Cell {
                         drive,
                         address,
                         value,

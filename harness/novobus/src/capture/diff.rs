@@ -2,7 +2,7 @@
 
 use crate::report::csv::status;
 use crate::report::meaning::Meaning;
-use crate::report::walk::Reader;
+use crate::report::walk::LinkReader;
 use harness_bench::capture::Capture;
 use harness_bench::counted::counted;
 use harness_bench::report::pcapng::name;
@@ -209,7 +209,7 @@ impl Pair<'_> {
 /// What a byte is, in words, with the section of its rule.
 fn words((trace, place): (&Trace, usize), index: usize) -> String {
     let link = &trace.channels[place];
-    let mut readers = Reader::all(trace);
+    let mut readers = LinkReader::all(trace);
     let mut last: Option<(Meaning, Option<u8>)> = None;
     for byte in link.octets().iter().take(index + 1) {
         last = Some((readers[place].see(byte).meaning, byte.received));

@@ -17,7 +17,7 @@ const MOST_BYTES: usize = 100_000;
 
 /// Something that explains what differs.
 #[derive(Clone, Debug)]
-pub(super) struct Explanation {
+pub(super) struct CaptureExplanation {
     /// What makes simulated drives behave so.
     pub(super) header: Header,
     /// Whether right drives are so, and it is nothing that the manual leaves open.
@@ -26,7 +26,7 @@ pub(super) struct Explanation {
     pub(super) remark: String,
 }
 
-impl Explanation {
+impl CaptureExplanation {
     /// Drives that do nothing that the manual leaves open.
     fn right(header: Header, what: &str) -> Self {
         Self {
@@ -38,12 +38,12 @@ impl Explanation {
 }
 
 /// What may explain a difference, the simplest first: monitoring, whole drives, then each open value of the bus without monitoring and with it.
-pub(super) fn explanations(capture: &Capture, told: &[CapturedFacts]) -> Vec<Explanation> {
+pub(super) fn explanations(capture: &Capture, told: &[CapturedFacts]) -> Vec<CaptureExplanation> {
     if capture.bytes() > MOST_BYTES {
         return Vec::new();
     }
     let monitoring = in_eeprom(capture, |ring, drive| !says(told, ring, drive));
-    let with = |choice: &Choice, more: &Header, words: &str| Explanation {
+    let with = |choice: &Choice, more: &Header, words: &str| CaptureExplanation {
         header: choice.in_all(capture.traces.len()).and(more),
         is_right: false,
         remark: format!(
@@ -77,12 +77,12 @@ pub(super) fn explanations(capture: &Capture, told: &[CapturedFacts]) -> Vec<Exp
     let loads = in_eeprom(capture, |ring, drive| reset.contains(&(ring, drive)));
     let loads = whole.and(&loads).and(&until_then);
     [
-        Explanation::right(monitoring.clone(), "monitor time-outs (ND21 9.9, 14.10.2)"),
-        Explanation::right(whole, "be whole ND21s, with their EEPROM (ND21 14.2.2)"),
+        CaptureExplanation::right(monitoring.clone(), "monitor time-outs (ND21 9.9, 14.10.2)"),
+        CaptureExplanation::right(whole, "be whole ND21s, with their EEPROM (ND21 14.2.2)"),
     ]
     .into_iter()
     .chain((!reset.is_empty()).then(|| {
-        Explanation::right(
+        CaptureExplanation::right(
             loads,
             "load time-out monitoring from their EEPROM at the reset (ND21 10.5, 14.3.6)",
         )

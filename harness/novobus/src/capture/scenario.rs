@@ -70,7 +70,7 @@ pub(super) fn scenario_with(
 ) -> Result<String, SketchError> {
     let mut rings = Vec::new();
     for (index, trace) in capture.traces.iter().enumerate() {
-        rings.push(Ring::of(index, trace)?);
+        rings.push(CapturedRing::of(index, trace)?);
     }
     if rings.iter().all(|ring| ring.first.octets().is_empty()) {
         return Err(SketchError::Silent);
@@ -104,7 +104,7 @@ pub(super) fn scenario_with(
 }
 
 /// What matters of a ring.
-struct Ring<'c> {
+struct CapturedRing<'c> {
     size: RingSize,
     first: &'c Channel,
     /// What arrived at the master.
@@ -112,7 +112,7 @@ struct Ring<'c> {
     told: CapturedFacts,
 }
 
-impl<'c> Ring<'c> {
+impl<'c> CapturedRing<'c> {
     fn of(index: usize, trace: &'c Trace) -> Result<Self, SketchError> {
         let size = RingSize::new(u64::from(trace.stations))
             .map_err(|error| SketchError::Ring(error.to_string()))?;
@@ -136,7 +136,7 @@ impl<'c> Ring<'c> {
 fn head(
     capture: &Capture,
     options: &JudgeOptions<'_>,
-    rings: &[Ring<'_>],
+    rings: &[CapturedRing<'_>],
     more: &Header,
 ) -> Result<Scenario, SketchError> {
     let sizes: Vec<_> = rings.iter().map(|ring| ring.size.drives()).collect();
@@ -162,7 +162,7 @@ fn head(
 }
 
 /// What cells held before, as far as the drives said it.
-fn cells(rings: &[Ring<'_>]) -> Vec<Setup> {
+fn cells(rings: &[CapturedRing<'_>]) -> Vec<Setup> {
     let mut setups = Vec::new();
     for (index, ring) in rings.iter().enumerate() {
         let mut cells = ring.told.cells.iter().peekable();
@@ -198,7 +198,7 @@ fn title(text: &str) -> String {
 }
 
 /// What the master sent, each run of bytes at its time.
-fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<Step> {
+fn sends(rings: &[CapturedRing<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<Step> {
     // Times are cut off to nanoseconds.
     let gap = tolerance.units().max(6);
     let byte_time = rate.byte_time();
@@ -239,7 +239,7 @@ fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<S
 }
 
 /// Writes what came back, up to the first byte that the master received with a line error: no line can ask for one.
-fn receives(text: &mut Text, index: usize, ring: &Ring<'_>, width: usize) {
+fn receives(text: &mut Text, index: usize, ring: &CapturedRing<'_>, width: usize) {
     let good = ring.received.iter().position(|byte| byte.error.is_some());
     let end = good.unwrap_or(ring.received.len());
     let shown = ring.received[..end].iter().enumerate();
@@ -272,6 +272,6 @@ fn receives(text: &mut Text, index: usize, ring: &Ring<'_>, width: usize) {
 /// Bytes received, counted from 0, that cannot be foretold, ring by ring.
 pub(crate) fn unforeseen(capture: &Capture) -> Vec<CapturedFacts> {
     let rings = capture.traces.iter().enumerate();
-    let told = rings.map(|(index, trace)| Ring::of(index, trace).map(|ring| ring.told));
+    let told = rings.map(|(index, trace)| CapturedRing::of(index, trace).map(|ring| ring.told));
     told.map(Result::unwrap_or_default).collect()
 }

@@ -132,7 +132,7 @@ fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
 fn of_link(link: &Channel, asked: &[SentByte], stations: u8) -> CapturedFacts {
     let sequences = behind_sequences(asked);
     let silences = behind_silences(asked, link.octets().len(), stations);
-    let mut reader = Reader {
+    let mut reader = StimulusReader {
         told: CapturedFacts::default(),
         sender: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
@@ -186,7 +186,7 @@ fn of_link(link: &Channel, asked: &[SentByte], stations: u8) -> CapturedFacts {
     reader.told
 }
 
-struct Reader {
+struct StimulusReader {
     told: CapturedFacts,
     /// The drive that sends on this link, where what was sent is read, and not what arrived.
     sender: Option<u8>,
@@ -204,7 +204,7 @@ struct Reader {
     open: BTreeMap<u8, Vec<(usize, u16, u8)>>,
 }
 
-impl Reader {
+impl StimulusReader {
     /// In a silence the supply of drives may have been switched off and on: the RAM is lost then (14.2).
     fn maybe_restarted(&mut self) {
         self.lost.extend(&self.written);

@@ -17,7 +17,7 @@ use harness_proto::nd21::units::{DriveUnits, UnitError, speed_from_raw, speed_to
 use indicatif::ProgressBar;
 
 /// A run, settled before anything moves.
-struct Run {
+struct PositionRun {
     axis: Axis,
     units: DriveUnits,
     target: Option<Position>,
@@ -98,7 +98,11 @@ fn turn(
     Ok(Exit::Passed)
 }
 
-fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Result<Run, Failure> {
+fn settle(
+    arguments: &PositionArguments,
+    axis: Axis,
+    units: DriveUnits,
+) -> Result<PositionRun, Failure> {
     let wrong = |error: UnitError| Failure::refused(error.to_string());
     let to = arguments.to.map(|to| (PositionMode::Absolute, "to", to));
     let by = arguments.by.map(|by| (PositionMode::Relative, "by", by));
@@ -111,7 +115,7 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Resul
     if speed.is_some_and(|speed| speed <= 0) {
         return Err(Failure::refused("--speed must be more than 0 rpm"));
     }
-    Ok(Run {
+    Ok(PositionRun {
         axis,
         units,
         target: target.transpose().map_err(wrong)?,
@@ -122,7 +126,7 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Resul
     })
 }
 
-impl Run {
+impl PositionRun {
     /// The value of a cell in words.
     fn cell(&self, bench: &OpenBench, name: &str) -> Result<String, Failure> {
         let locations: Vec<MemoryRange> = cells(&[name.to_owned()])?;

@@ -24,7 +24,7 @@ const BUSY_HOST: Span = Span::from_millis(400);
 /// How long bytes on their way may take to come back before a pause.
 const PAUSE: Span = Span::from_millis(500);
 
-struct Ring {
+struct PumpedRing {
     master: AnyMaster,
     /// When the line is free for the next byte.
     free: Instant,
@@ -39,7 +39,7 @@ struct Ring {
 /// The masters of one or two rings over one link.
 pub(crate) struct Masters<'l> {
     link: Box<dyn Line + 'l>,
-    rings: Vec<Ring>,
+    rings: Vec<PumpedRing>,
     /// Events that belong to no job, oldest first, with the number of the ring.
     log: Vec<(usize, Event)>,
     still: StoodStill,
@@ -60,7 +60,7 @@ impl<'l> Masters<'l> {
             .into_iter()
             .find(|rate| rate.byte_time() == link.byte_time())
             .unwrap_or_default();
-        let rings = sizes.iter().map(|&size| Ring {
+        let rings = sizes.iter().map(|&size| PumpedRing {
             master: AnyMaster::new(size, rate, master_options, options.deviates),
             free: now,
             home: now,
@@ -94,7 +94,7 @@ impl<'l> Masters<'l> {
     }
 
     pub(crate) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
-        let Some(Ring { master, .. }) = self.rings.get(ring) else {
+        let Some(PumpedRing { master, .. }) = self.rings.get(ring) else {
             return false;
         };
         let bytes = telegram(master.ring(), drive, command);
@@ -321,7 +321,7 @@ impl<'l> Masters<'l> {
 
     /// Sends nothing more and waits until all bytes are back, at most until `end`.
     pub(crate) fn drain(&mut self, end: Instant) {
-        let under_way = |ring: &Ring| ring.master.under_way() > 0;
+        let under_way = |ring: &PumpedRing| ring.master.under_way() > 0;
         self.poll();
         while self.halt().is_none() && self.rings.iter().any(under_way) && self.link.now() < end {
             let missed = self.rings.iter().filter_map(|r| r.master.poll_timeout());

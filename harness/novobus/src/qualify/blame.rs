@@ -5,7 +5,7 @@
 //! apart, the attempt is played again with the drives' roles exchanged.
 
 use super::diagnose::{Named, Whose, proven};
-use super::exchange::{Sent, begin};
+use super::exchange::{AttemptBytes, begin};
 use super::pinned::Pinned;
 use crate::calm::calm;
 use crate::language::read::RingScenario;
@@ -56,12 +56,12 @@ pub(crate) struct Sighting {
     pub(super) is_refused: bool,
     /// Whether it stands in a telegram with a short address.
     pub(super) is_short: bool,
-    sent: Sent,
+    sent: AttemptBytes,
     /// How many bytes are sent until the difference is seen and the telegram is complete.
     count: usize,
     /// The same with an address byte in every telegram, where the one of the byte has a short address: another drive may take a short
     /// address for its own (9.2).
-    long: Option<(Sent, usize)>,
+    long: Option<(AttemptBytes, usize)>,
 }
 
 impl Sighting {
@@ -85,11 +85,13 @@ impl Sighting {
         let before = match place.checked_sub(1) {
             _ if place < first => return None,
             Some(before) if before >= first => {
-                Sent::of(attempt, before, drives, byte_time)?.bytes.len()
+                AttemptBytes::of(attempt, before, drives, byte_time)?
+                    .bytes
+                    .len()
             }
             _ => 0,
         };
-        let sent = Sent::of(attempt, place, drives, byte_time)?;
+        let sent = AttemptBytes::of(attempt, place, drives, byte_time)?;
         let all = sent.roles.iter().zip(&sent.bytes).enumerate().skip(before);
         let answered = all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
         let answered: Vec<usize> = answered.map(|(index, _)| index).collect();
@@ -346,7 +348,7 @@ fn may_be(drives: u8, drive: u8, wrong: &BTreeSet<u8>) -> bool {
     [&first, &follower, &(&first | &follower)].contains(&wrong)
 }
 
-impl Sent {
+impl AttemptBytes {
     /// The drive that a differing byte belongs to, the section of the broken rule, and where the telegram ends. `came` is what was received
     /// in the place of a byte.
     fn blame(

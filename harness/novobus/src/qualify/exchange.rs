@@ -46,14 +46,14 @@ enum Piece {
 
 /// What the master sent in an attempt, conversation by conversation.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sent {
+pub(super) struct AttemptBytes {
     pieces: Vec<Piece>,
     /// The bytes, and whether each went round whole.
     pub(super) bytes: Vec<(u8, bool)>,
     pub(super) roles: Vec<Role>,
 }
 
-impl Sent {
+impl AttemptBytes {
     /// What was sent into a ring of `drives` after the reset of the drives, up to the conversation `last`. `None` if it cannot be repeated:
     /// because it went into two rings, or had faults at other places than bytes of the master's own link.
     pub(super) fn of(
@@ -333,7 +333,7 @@ impl Piece {
     }
 }
 
-impl Sent {
+impl AttemptBytes {
     /// The pieces, with a gap behind each order to an EEPROM: other drives may be slower than the one that was asked first.
     fn patient(&self) -> Vec<Piece> {
         let mut pieces = Vec::with_capacity(self.pieces.len());
@@ -411,7 +411,7 @@ mod tests {
                 Exchange::new(3, 1, command).expect("a drive").bytes
             });
             let bytes: Vec<_> = bytes.map(|byte| (byte, true)).collect();
-            let sent = Sent {
+            let sent = AttemptBytes {
                 pieces: vec![Piece::Byte; bytes.len()],
                 roles: roles(RingSize::new(3).expect("a ring"), &bytes),
                 bytes,
@@ -430,7 +430,7 @@ mod tests {
     fn a_short_address_is_written_out() {
         let written_out = |bytes: &[u8]| {
             let bytes: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
-            let sent = Sent {
+            let sent = AttemptBytes {
                 pieces: vec![Piece::Byte; bytes.len()],
                 roles: roles(RingSize::new(3).expect("a ring"), &bytes),
                 bytes,

@@ -25,12 +25,12 @@ pub(crate) use hypothesis::{Hypothesis, explaining};
 #[cfg(test)]
 pub(crate) use pinned::{Pinned, questions};
 #[cfg(test)]
-pub(crate) use probes::{Asked, Probe, hypotheses};
+pub(crate) use probes::{Probe, ProbeTarget, hypotheses};
 pub(crate) use probes::{conversations, probes, some_drives, thorough};
 pub(crate) use qualification::{Qualification, QualificationFacts, QualifiedBench};
 pub(crate) use recorded::{of_parts, of_run};
 #[cfg(test)]
-pub(crate) use settle::{Answer, answer};
+pub(crate) use settle::{ProbeAnswer, answer};
 
 /// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the
 /// ring, and marches over the EEPROM.

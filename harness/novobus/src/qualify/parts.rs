@@ -3,7 +3,7 @@
 //! What the first part has heard is noted as if it were alone. Of the others only what differs from it is noted as well, so that nothing is
 //! counted twice and nothing is lost.
 
-use super::settle::{Answer, between};
+use super::settle::{ProbeAnswer, between};
 use crate::language::syntax::Header;
 use crate::rig::OnRings;
 use crate::twin::{Conversation, Done};
@@ -104,7 +104,7 @@ impl Parts {
 
 /// What came of asking a probe.
 #[derive(Debug)]
-pub(super) enum Asking {
+pub(super) enum ProbeOutcome {
     /// A value, the header that makes it, and of a time the shortest and the longest that explain everything, in tenths of a millisecond.
     Settled {
         /// It, for people.
@@ -120,7 +120,7 @@ pub(super) enum Asking {
     Open(String),
 }
 
-impl Asking {
+impl ProbeOutcome {
     /// What several parts have shown of a property of the ring or of a drive. The error has their values, if they contradict each other.
     pub(super) fn agreed(
         property: &str,
@@ -154,7 +154,7 @@ impl Asking {
             ) if this.0.max(other.0) <= this.1.min(other.1) => {
                 let (from, to) = (this.0.max(other.0), this.1.min(other.1));
                 match between(property, drive.unwrap_or(0), from, to) {
-                    Answer::Settled {
+                    ProbeAnswer::Settled {
                         value,
                         header,
                         span,
@@ -183,24 +183,24 @@ impl Asking {
 mod tests {
     use super::*;
 
-    fn time(from: u64, to: u64) -> Asking {
-        Asking::Settled {
+    fn time(from: u64, to: u64) -> ProbeOutcome {
+        ProbeOutcome::Settled {
             value: format!("{from} to {to}"),
             header: Header::default(),
             span: Some((from, to)),
         }
     }
 
-    fn word(value: &str) -> Asking {
-        Asking::Settled {
+    fn word(value: &str) -> ProbeOutcome {
+        ProbeOutcome::Settled {
             value: value.to_owned(),
             header: Header::default(),
             span: None,
         }
     }
 
-    fn agreed(all: impl IntoIterator<Item = Asking>) -> Result<String, String> {
-        let agreed = Asking::agreed("eeprom-time", Some(1), all);
+    fn agreed(all: impl IntoIterator<Item = ProbeOutcome>) -> Result<String, String> {
+        let agreed = ProbeOutcome::agreed("eeprom-time", Some(1), all);
         agreed.map(|asking| asking.text().to_owned())
     }
 
@@ -211,13 +211,13 @@ mod tests {
         assert_eq!(both, Ok("12ms to 15ms".to_owned()));
         let apart = agreed([time(100, 150), time(151, 170)]);
         assert_eq!(apart, Err("100 to 150, 151 to 170".to_owned()));
-        let longer = Asking::NotDone("longer than 200ms".to_owned());
+        let longer = ProbeOutcome::NotDone("longer than 200ms".to_owned());
         assert!(agreed([time(100, 150), longer]).is_err());
     }
 
     #[test]
     fn a_value_of_one_part_stands_until_another_contradicts_it() {
-        let open = || Asking::Open("not asked".to_owned());
+        let open = || ProbeOutcome::Open("not asked".to_owned());
         assert_eq!(agreed([open(), word("kept")]), Ok("kept".to_owned()));
         assert_eq!(agreed([word("kept"), open()]), Ok("kept".to_owned()));
         assert_eq!(agreed([word("kept"), word("kept")]), Ok("kept".to_owned()));

@@ -63,7 +63,7 @@ impl fmt::Display for Pinned {
 
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum QuestionKind {
     /// A drive went into the error mode where the model's did not: which one is it, and why?
     Refusal,
     /// A telegram with this address byte is for no drive, and was not left as it is: which drive takes it for its own?
@@ -77,7 +77,7 @@ enum Kind {
 /// A question, and the scenario that asks it.
 #[derive(Clone, Debug)]
 pub(crate) struct Question<'s> {
-    kind: Kind,
+    kind: QuestionKind,
     sighting: &'s Sighting,
     drives: u8,
     pub entry: RingScenario,
@@ -94,13 +94,13 @@ pub(crate) fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Que
     let mut questions: Vec<Question<'_>> = Vec::new();
     let mut asked = BTreeSet::new();
     for (name, sighting) in shortest {
-        let Some(kind) = Kind::of(sighting, drives) else {
+        let Some(kind) = QuestionKind::of(sighting, drives) else {
             continue;
         };
         let alike = |question: &&Question<'_>| {
             std::mem::discriminant(&question.kind) == std::mem::discriminant(&kind)
         };
-        let most = if matches!(kind, Kind::Cell(_)) {
+        let most = if matches!(kind, QuestionKind::Cell(_)) {
             1
         } else {
             MOST_ASKED
@@ -109,10 +109,10 @@ pub(crate) fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Que
             continue;
         }
         let text = match kind {
-            Kind::Refusal => refusal(sighting, drives),
-            Kind::Nobody(byte) => taken(drives, byte),
-            Kind::Address(byte) => kept(drives, byte),
-            Kind::Cell(drive) => march(drives, drive),
+            QuestionKind::Refusal => refusal(sighting, drives),
+            QuestionKind::Nobody(byte) => taken(drives, byte),
+            QuestionKind::Address(byte) => kept(drives, byte),
+            QuestionKind::Cell(drive) => march(drives, drive),
         };
         let source = text.map(|text| Source {
             name: format!("{}{}-{name}", super::ASKED, kind.word()),
@@ -129,7 +129,7 @@ pub(crate) fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Que
     questions
 }
 
-impl Kind {
+impl QuestionKind {
     /// What to ask about a sighting.
     fn of(sighting: &Sighting, drives: u8) -> Option<Self> {
         let (wanted, _) = sighting.values;
@@ -164,10 +164,10 @@ impl Question<'_> {
     #[must_use]
     pub(crate) fn answer(&self, conversations: &[Conversation]) -> Option<Pinned> {
         match self.kind {
-            Kind::Refusal => self.refused(conversations),
-            Kind::Nobody(byte) => taken_by(self.drives, byte, conversations),
-            Kind::Address(byte) => kept_by(self.drives, byte, conversations),
-            Kind::Cell(drive) => cells(self.sighting, drive, conversations),
+            QuestionKind::Refusal => self.refused(conversations),
+            QuestionKind::Nobody(byte) => taken_by(self.drives, byte, conversations),
+            QuestionKind::Address(byte) => kept_by(self.drives, byte, conversations),
+            QuestionKind::Cell(drive) => cells(self.sighting, drive, conversations),
         }
     }
 

@@ -56,7 +56,7 @@ pub(crate) struct Probe {
     /// The section that leaves it open.
     pub section: &'static str,
     /// What the probe asks.
-    pub asked: Asked,
+    pub asked: ProbeTarget,
     /// What is assumed of the drive.
     pub assumed: Header,
     /// The conversations.
@@ -69,8 +69,8 @@ impl Probe {
     /// The drive that it asks; `None` where it asks the whole ring.
     pub(super) const fn drive(&self) -> Option<u8> {
         match self.asked {
-            Asked::Drive(drive, _) => Some(drive),
-            Asked::Ring => None,
+            ProbeTarget::Drive(drive, _) => Some(drive),
+            ProbeTarget::Ring => None,
         }
     }
 
@@ -91,7 +91,7 @@ const OF_SILENT: &str = "-silent";
 
 /// What a probe asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Asked {
+pub(crate) enum ProbeTarget {
     /// The whole ring: every drive answers with its end of the bus.
     Ring,
     /// One drive, by these cells.
@@ -167,7 +167,7 @@ pub(crate) fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
         probes.push(Probe {
             property: property.name,
             section: property.section,
-            asked: Asked::Ring,
+            asked: ProbeTarget::Ring,
             assumed: Header::default(),
             entries,
             of_silent: None,
@@ -194,7 +194,7 @@ pub(crate) fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             probes.push(Probe {
                 property: property.name,
                 section: property.section,
-                asked: Asked::Drive(drive, looks),
+                asked: ProbeTarget::Drive(drive, looks),
                 assumed: released(drive).into(),
                 entries: vec![probe(&name, &text, drives)?],
                 of_silent: of_silent.transpose()?,

@@ -7,10 +7,10 @@ use super::delays::{DELAYS, held_back};
 use super::diagnose::{deviating_masters, name};
 use super::eeprom::{dumps, marches};
 use super::findings::Findings;
-use super::parts::{Asking, Parts};
+use super::parts::{Parts, ProbeOutcome};
 use super::pinned::questions;
-use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
-use super::settle::{Answer, answer, silence};
+use super::probes::{Probe, ProbeTarget, SELF_TEST_BUS, conversations, probes, thorough};
+use super::settle::{ProbeAnswer, answer, silence};
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::rig::OnRings;
@@ -440,20 +440,20 @@ impl Qualification {
             let whose = probe.drive();
             let whose = whose.map_or_else(String::new, |drive| format!("drive {drive}: "));
             match self.ask_all(bench, &probe, &known)? {
-                Asking::Settled { value, header, .. } => {
+                ProbeOutcome::Settled { value, header, .. } => {
                     bench.tell(&format!("{property} ({section}): {whose}{value}\n"))?;
                     match probe.asked {
-                        Asked::Ring => known = known.and(&header),
-                        Asked::Drive(drive, _)
+                        ProbeTarget::Ring => known = known.and(&header),
+                        ProbeTarget::Drive(drive, _)
                             if (property, &value[..]) == (SELF_TEST_BUS, SILENT) =>
                         {
                             self.silent.insert(drive);
                         }
-                        Asked::Drive(..) => {}
+                        ProbeTarget::Drive(..) => {}
                     }
                     profile.settle(property, &section, &format!("{whose}{value}"), &header);
                 }
-                Asking::NotDone(why) | Asking::Open(why) => {
+                ProbeOutcome::NotDone(why) | ProbeOutcome::Open(why) => {
                     bench.tell(&format!("{property} ({section}): {whose}{why}\n"))?;
                     profile.leave_open(property, &format!("{whose}{why}"));
                 }
@@ -468,19 +468,19 @@ impl Qualification {
         bench: &mut B,
         probe: &Probe,
         known: &Header,
-    ) -> Result<Asking, B::Stop> {
+    ) -> Result<ProbeOutcome, B::Stop> {
         let mut all = vec![self.ask(bench, probe, known)?];
         self.on_others(bench, |course, other| {
             all.push(course.ask(other, probe, known)?);
             Ok(())
         })?;
-        let agreed = Asking::agreed(probe.property, probe.drive(), all);
+        let agreed = ProbeOutcome::agreed(probe.property, probe.drive(), all);
         Ok(agreed.unwrap_or_else(|values| {
             let differ = format!("its values differ from part to part: {values}");
             let name = probe.name();
             self.findings
                 .note_open(format!("the probe of {name}: {differ}"));
-            Asking::Open(differ)
+            ProbeOutcome::Open(differ)
         }))
     }
 
@@ -490,39 +490,39 @@ impl Qualification {
         bench: &mut B,
         probe: &Probe,
         known: &Header,
-    ) -> Result<Asking, B::Stop> {
+    ) -> Result<ProbeOutcome, B::Stop> {
         let answer = match self.answer(bench, probe, known)? {
             Ok(answer) => answer,
-            Err(why) => return Ok(Asking::Open(format!("not asked: {why}"))),
+            Err(why) => return Ok(ProbeOutcome::Open(format!("not asked: {why}"))),
         };
         if self.parts.other.is_none() {
             self.findings.note_probe();
         }
         Ok(match answer {
-            Answer::Settled {
+            ProbeAnswer::Settled {
                 value,
                 header,
                 span,
-            } => Asking::Settled {
+            } => ProbeOutcome::Settled {
                 value,
                 header,
                 span,
             },
-            Answer::NoDifference => Asking::Open(
+            ProbeAnswer::NoDifference => ProbeOutcome::Open(
                 "every value explains the bytes received: the drive was not in a state that shows the property".to_owned(),
             ),
-            Answer::Several(values) => Asking::Open(format!(
+            ProbeAnswer::Several(values) => ProbeOutcome::Open(format!(
                 "the bytes received do not tell which: {values}"
             )),
-            Answer::NotDone(time) => Asking::NotDone(format!(
+            ProbeAnswer::NotDone(time) => ProbeOutcome::NotDone(format!(
                 "longer than {time}: not finished when asked for the last time"
             )),
-            Answer::Unexplained => {
+            ProbeAnswer::Unexplained => {
                 let why = "no value explains the bytes received";
                 let name = self.parts.named(&probe.name());
                 self.findings
                     .note_open(format!("the probe of {name}: {why}"));
-                Asking::Open(why.to_owned())
+                ProbeOutcome::Open(why.to_owned())
             }
         })
     }
@@ -533,8 +533,8 @@ impl Qualification {
         bench: &mut B,
         probe: &Probe,
         known: &Header,
-    ) -> Result<Result<Answer, String>, B::Stop> {
-        if let (Some(entry), Asked::Drive(drive, _)) = (&probe.of_silent, probe.asked)
+    ) -> Result<Result<ProbeAnswer, String>, B::Stop> {
+        if let (Some(entry), ProbeTarget::Drive(drive, _)) = (&probe.of_silent, probe.asked)
             && self.silent.contains(&drive)
         {
             return self.answer_of_silent(bench, (probe.property, drive), entry);
@@ -569,11 +569,11 @@ impl Qualification {
                 last.push((entry.short_name(), played));
             }
             if self.parts.repeats_probe(&conversations) {
-                return Ok(Ok(Answer::NoDifference));
+                return Ok(Ok(ProbeAnswer::NoDifference));
             }
             let twin = |header: &Header| bench.twin(&known.and(header));
             match answer(probe, self.drives, &conversations, exactness, &twin) {
-                Ok(Answer::Unexplained) => {}
+                Ok(ProbeAnswer::Unexplained) => {}
                 // A question that a late computer has asked says little of a time. A drive is as late at each turn.
                 Ok(answer) if !late || turn == most => return Ok(Ok(answer)),
                 Ok(_) => {}
@@ -589,7 +589,7 @@ impl Qualification {
         for (name, played) in &last {
             self.findings.note_attempts(name, played);
         }
-        Ok(Ok(Answer::Unexplained))
+        Ok(Ok(ProbeAnswer::Unexplained))
     }
 }
 
@@ -600,7 +600,7 @@ impl Qualification {
         bench: &mut B,
         (property, drive): (&str, u8),
         entry: &RingScenario,
-    ) -> Result<Result<Answer, String>, B::Stop> {
+    ) -> Result<Result<ProbeAnswer, String>, B::Stop> {
         let played = bench.play(entry)?;
         let Some(attempt) = played.last_played().and_then(Attempt::sound) else {
             return Ok(Err(played.outcome.remarks.join("; ")));
@@ -610,6 +610,6 @@ impl Qualification {
         let place = (self.drives, drive);
         let byte_time = self.facts.byte_time;
         let answer = last.map(|conversation| silence(property, place, conversation, byte_time));
-        Ok(Ok(answer.unwrap_or(Answer::Unexplained)))
+        Ok(Ok(answer.unwrap_or(ProbeAnswer::Unexplained)))
     }
 }

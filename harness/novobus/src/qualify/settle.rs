@@ -1,7 +1,7 @@
 //! Settles a property from the answers to its probe.
 
 use super::hypothesis::{Fit, Hypothesis, explaining};
-use super::probes::{Asked, Probe, hypotheses};
+use super::probes::{Probe, ProbeTarget, hypotheses};
 use crate::language::syntax::{DriveRange, Header, Setup, SetupKind};
 use crate::twin::{Conversation, Exactness, Silences, Twin};
 use harness_bench::scenario::times::Duration;
@@ -22,7 +22,7 @@ const LATENESS: Span = Span::from_millis(2);
 
 /// The result of a probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub(crate) enum ProbeAnswer {
     /// A value explains every byte.
     Settled {
         /// It, for people.
@@ -53,8 +53,8 @@ pub(crate) fn answer<E>(
     conversations: &[Vec<Conversation>],
     exactness: Exactness,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Result<Answer, E> {
-    let Asked::Drive(drive, looks) = probe.asked else {
+) -> Result<ProbeAnswer, E> {
+    let ProbeTarget::Drive(drive, looks) = probe.asked else {
         let all = hypotheses(probe.property, drives);
         let lateness = match exactness.tolerance {
             Span::ZERO => Span::ZERO,
@@ -68,17 +68,17 @@ pub(crate) fn answer<E>(
             let found = explaining_all(simplest, conversations, exactness, twin)?;
             // A time is the one that fits best. No byte tells one drive from another one.
             if settings > 1 && found.len() > 1 && all.iter().all(is_of_words) {
-                return Ok(Answer::Several(one_of(&found)));
+                return Ok(ProbeAnswer::Several(one_of(&found)));
             }
             if let Some(hypothesis) = best(&found, lateness) {
-                return Ok(Answer::Settled {
+                return Ok(ProbeAnswer::Settled {
                     value: hypothesis.name.clone(),
                     header: hypothesis.header.clone(),
                     span: None,
                 });
             }
         }
-        return Ok(Answer::Unexplained);
+        return Ok(ProbeAnswer::Unexplained);
     };
     let exactness = Exactness {
         looks: Some((drive, looks)),
@@ -95,7 +95,7 @@ pub(crate) fn answer<E>(
         )
     };
     match asked(&probe.assumed)? {
-        Answer::Unexplained if !probe.assumed.is_empty() => asked(&Header::default()),
+        ProbeAnswer::Unexplained if !probe.assumed.is_empty() => asked(&Header::default()),
         answer => Ok(answer),
     }
 }
@@ -127,7 +127,7 @@ fn of_the_drive<E>(
     conversations: &[Conversation],
     exactness: Exactness,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Result<Answer, E> {
+) -> Result<ProbeAnswer, E> {
     let header = |what: SetupKind| Header::from(Setup::new(DriveRange::one(0, drive), what));
     let known = PROPERTIES.iter().find(|known| known.name == property);
     let explained = |what: SetupKind| -> Result<Explained, E> {
@@ -138,11 +138,11 @@ fn of_the_drive<E>(
         let explained = |tenths: u64| explained(time(tenths));
         return Ok(match bracket(tenths(longest), &explained)? {
             Bracket::Between(from, to) if to == tenths(longest) => {
-                Answer::NotDone(written(from).to_string())
+                ProbeAnswer::NotDone(written(from).to_string())
             }
             Bracket::Between(from, to) => between(property, drive, from, to),
-            Bracket::Anything => Answer::NoDifference,
-            Bracket::Nothing => Answer::Unexplained,
+            Bracket::Anything => ProbeAnswer::NoDifference,
+            Bracket::Nothing => ProbeAnswer::Unexplained,
         });
     }
     let mut explaining = Vec::new();
@@ -153,20 +153,20 @@ fn of_the_drive<E>(
         }
     }
     Ok(match explaining.as_slice() {
-        [] => Answer::Unexplained,
-        [what] => Answer::Settled {
+        [] => ProbeAnswer::Unexplained,
+        [what] => ProbeAnswer::Settled {
             value: what.value(),
             header: header(what.clone()),
             span: None,
         },
-        _ => Answer::NoDifference,
+        _ => ProbeAnswer::NoDifference,
     })
 }
 
 /// A time of a drive, in tenths of a millisecond. A simulated drive gets the middle.
-pub(super) fn between(property: &str, drive: u8, from: u64, to: u64) -> Answer {
+pub(super) fn between(property: &str, drive: u8, from: u64, to: u64) -> ProbeAnswer {
     let time = SetupKind::time(property, written(from.midpoint(to)));
-    Answer::Settled {
+    ProbeAnswer::Settled {
         value: format!("{} to {}", written(from), written(to)),
         header: Setup::new(DriveRange::one(0, drive), time).into(),
         span: Some((from, to)),
@@ -180,23 +180,23 @@ pub(super) fn silence(
     (drives, drive): (u8, u8),
     conversation: &Conversation,
     byte_time: Span,
-) -> Answer {
+) -> ProbeAnswer {
     let (sent, times) = (conversation.sent_in(0), conversation.sent_at(0));
     let lost = sent.len().saturating_sub(conversation.received_in(0).len());
     let Ok(size) = RingSize::new(u64::from(drives)) else {
-        return Answer::Unexplained;
+        return ProbeAnswer::Unexplained;
     };
     let roles = roles(size, &sent);
     let is_check = |role: &Role| matches!(role, Role::Check { drive: Some(addressed), .. } if *addressed == drive);
     let Some(reset) = roles.iter().position(is_check).filter(|_| lost > 0) else {
-        return Answer::Unexplained;
+        return ProbeAnswer::Unexplained;
     };
     let began = times[reset] + byte_time * u64::from(drives - drive);
     let since = |place: usize| tenths(times[place].since(began));
     let last = reset + lost;
     match roles.get(last + 1) {
         Some(Role::Idle) => between(property, drive, since(last), since(last + 1)),
-        _ => Answer::NotDone(written(since(last.min(roles.len() - 1))).to_string()),
+        _ => ProbeAnswer::NotDone(written(since(last.min(roles.len() - 1))).to_string()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::csv::{remark, status};
 use super::picture::MAX_ROWS;
-use super::walk::{Reader, SenderState};
+use super::walk::{LinkReader, SenderState};
 use harness_bench::shown::RowPlacing;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// One byte of one link.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Cell {
+struct LinkCell {
     at: u64,
     state: SenderState,
     /// What was sent and what arrived.
@@ -24,7 +24,7 @@ struct Cell {
     fault: bool,
 }
 
-impl Cell {
+impl LinkCell {
     /// Whether two bytes are shown alike.
     fn like(&self, other: &Self) -> bool {
         !self.fault
@@ -38,7 +38,7 @@ impl Cell {
 pub(crate) struct Columns {
     /// The first row.
     first: usize,
-    links: Vec<Vec<Cell>>,
+    links: Vec<Vec<LinkCell>>,
     /// Whether rows were left out.
     pub(crate) cut: bool,
 }
@@ -56,7 +56,7 @@ impl Columns {
         let wanted = rows.start.min(all)..rows.end.min(all);
         let end = wanted.end.min(wanted.start + MAX_ROWS);
         let mut links = Vec::new();
-        for (link, mut reader) in trace.channels.iter().zip(Reader::all(trace)) {
+        for (link, mut reader) in trace.channels.iter().zip(LinkReader::all(trace)) {
             let mut cells = Vec::new();
             for (row, byte) in link.octets().iter().enumerate().take(end) {
                 let seen = reader.see(byte);
@@ -66,7 +66,7 @@ impl Columns {
                 let marked = seen.mark.map_or_else(String::new, remark);
                 let detected =
                     |mark: &harness_sim::record::Remark| mark.marks().contains(Marks::DETECTED);
-                cells.push(Cell {
+                cells.push(LinkCell {
                     at: byte.at.since_start().units(),
                     state: seen.state,
                     status: carried(byte),

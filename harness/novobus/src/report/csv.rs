@@ -14,7 +14,7 @@
 //! | `section` | the section of the rule in the ND21 manual |
 //! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
 
-use super::walk::{ByteSeen, Reader};
+use super::walk::{ByteSeen, LinkReader};
 use harness_bench::report::pcapng::name;
 use harness_bench::traffic::in_time;
 use harness_proto::novobus::error_mode::Marks;
@@ -39,7 +39,7 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
     let mut row = String::new();
     for (ring, trace) in traces.iter().enumerate() {
         let names: Vec<_> = trace.channels.iter().map(|link| name(ring, link)).collect();
-        let mut readers = Reader::all(trace);
+        let mut readers = LinkReader::all(trace);
         for (place, index) in in_time(&trace.channels) {
             let byte = &trace.channels[place].octets()[index];
             let seen = readers[place].see(byte);

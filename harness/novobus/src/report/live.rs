@@ -19,7 +19,7 @@ const HEARD: usize = 1_024;
 
 /// What the bytes of a line are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Kind {
+enum ByteKind {
     #[default]
     Telegram,
     Idle,
@@ -29,7 +29,7 @@ enum Kind {
     Any,
 }
 
-impl Kind {
+impl ByteKind {
     const fn of(role: ByteRole) -> Self {
         match role {
             ByteRole::Synco | ByteRole::Pause => Self::Idle,
@@ -44,7 +44,7 @@ impl Kind {
 /// A line that is being made.
 #[derive(Clone, Debug, Default)]
 struct OpenLine {
-    kind: Kind,
+    kind: ByteKind,
     bytes: usize,
     text: String,
     phrases: Vec<String>,
@@ -86,10 +86,10 @@ impl LinkText {
     fn byte(&mut self, nanos: u64, received: Received) -> Vec<LiveLine> {
         let mut lines = Vec::from_iter(self.idle(nanos));
         let meaning = self.observer.see(Some(received.byte), received.error);
-        let kind = Kind::of(meaning.role);
+        let kind = ByteKind::of(meaning.role);
         let begins = meaning.role == ByteRole::Sync
-            || (kind != Kind::Any && kind != self.begun.kind)
-            || (self.begun.bytes >= MOST && kind != Kind::Telegram);
+            || (kind != ByteKind::Any && kind != self.begun.kind)
+            || (self.begun.bytes >= MOST && kind != ByteKind::Telegram);
         if begins {
             lines.extend(self.end());
         }

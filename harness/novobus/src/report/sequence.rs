@@ -3,7 +3,7 @@
 
 use crate::report::csv::{remark, status};
 use crate::report::meaning::ByteRole;
-use crate::report::walk::Reader;
+use crate::report::walk::LinkReader;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng::name;
 use harness_proto::novobus::error_mode::Marks;
@@ -62,14 +62,14 @@ impl Who {
 
 /// The class of its colour: as in the diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum EventKind {
     Job,
     Answer,
     Trouble,
     Sequence,
 }
 
-impl Kind {
+impl EventKind {
     const fn class(self) -> &'static str {
         match self {
             Self::Job => "b",
@@ -83,7 +83,7 @@ impl Kind {
 #[derive(Clone, Debug)]
 struct Event {
     at: Instant,
-    kind: Kind,
+    kind: EventKind,
     from: Who,
     to: Who,
     what: String,
@@ -104,7 +104,7 @@ pub(crate) fn sequence(html: &mut Html, id: &str, trace: &Trace) -> bool {
 
 fn events(trace: &Trace) -> Vec<Event> {
     let mut events = Vec::new();
-    for (link, reader) in trace.channels.iter().zip(Reader::all(trace)) {
+    for (link, reader) in trace.channels.iter().zip(LinkReader::all(trace)) {
         if link.from.is_none() || link.to.is_none() {
             said(link, reader, &mut events);
         }
@@ -117,7 +117,7 @@ fn events(trace: &Trace) -> Vec<Event> {
 }
 
 /// What one link at the master carried, put together.
-fn said(link: &Channel, mut reader: Reader<'_>, events: &mut Vec<Event>) {
+fn said(link: &Channel, mut reader: LinkReader<'_>, events: &mut Vec<Event>) {
     let master = link.from.is_none();
     // By drive: a command may be cut over several telegrams.
     let mut open: BTreeMap<(Option<u8>, bool), usize> = BTreeMap::new();
@@ -189,9 +189,9 @@ fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
         "a command"
     };
     let (kind, from, to) = if master {
-        (Kind::Job, Who::Master, whom)
+        (EventKind::Job, Who::Master, whom)
     } else {
-        (Kind::Answer, whom, Who::Master)
+        (EventKind::Answer, whom, Who::Master)
     };
     Event {
         at,
@@ -207,13 +207,13 @@ fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
 /// Zeros, numbers and check sequences: bytes of a kind one after another are one event.
 fn open_run(role: ByteRole, master: bool, at: Instant, events: &mut Vec<Event>) -> Option<usize> {
     let (kind, what) = match role {
-        ByteRole::ErrorZero if master => (Kind::Sequence, "zeros"),
-        ByteRole::CheckSequence if master => (Kind::Sequence, CHECK),
-        ByteRole::CheckSequence => (Kind::Sequence, "check sequence is back"),
-        ByteRole::ErrorZero => (Kind::Trouble, "zeros: a drive is in the error mode"),
-        ByteRole::ErrorAddress => (Kind::Trouble, "number spelled out"),
-        ByteRole::Foreign => (Kind::Trouble, "no telegram"),
-        ByteRole::Lost => (Kind::Trouble, "nothing arrived"),
+        ByteRole::ErrorZero if master => (EventKind::Sequence, "zeros"),
+        ByteRole::CheckSequence if master => (EventKind::Sequence, CHECK),
+        ByteRole::CheckSequence => (EventKind::Sequence, "check sequence is back"),
+        ByteRole::ErrorZero => (EventKind::Trouble, "zeros: a drive is in the error mode"),
+        ByteRole::ErrorAddress => (EventKind::Trouble, "number spelled out"),
+        ByteRole::Foreign => (EventKind::Trouble, "no telegram"),
+        ByteRole::Lost => (EventKind::Trouble, "nothing arrived"),
         _ => return None,
     };
     let (from, to) = if master {
@@ -252,7 +252,7 @@ fn asked(events: &mut [Event]) {
     let period = |at: Instant| sequences.iter().filter(|sequence| **sequence < at).count();
     let mut answers: BTreeMap<(Who, usize), Vec<usize>> = BTreeMap::new();
     for (index, event) in events.iter().enumerate() {
-        if event.kind == Kind::Answer {
+        if event.kind == EventKind::Answer {
             let key = (event.from, period(event.at));
             answers.entry(key).or_default().push(index);
         }
@@ -260,7 +260,7 @@ fn asked(events: &mut [Event]) {
     let mut next: BTreeMap<(Who, usize), usize> = BTreeMap::new();
     for index in 0..events.len() {
         let job = &events[index];
-        if job.kind != Kind::Job {
+        if job.kind != EventKind::Job {
             continue;
         }
         let key = (job.to, period(job.at));
@@ -311,7 +311,7 @@ fn faults(trace: &Trace, events: &mut Vec<Event>) {
         }
         events.push(Event {
             at: byte.at,
-            kind: Kind::Trouble,
+            kind: EventKind::Trouble,
             from: end(link.from),
             to: end(link.to),
             what: format!("fault on {}", name(0, link)),
@@ -344,12 +344,12 @@ fn remarks(trace: &Trace, events: &mut Vec<Event>) {
         if number + 1 == DETECTED && more > 0 {
             let _infallible = write!(what, "; and {more} times more, drives behind it");
         }
-        events.push(note(mark.at, mark.station, what, Kind::Trouble));
+        events.push(note(mark.at, mark.station, what, EventKind::Trouble));
     }
     let back = of(Marks::RECOVERED);
     if let Some(last) = back.clone().next_back() {
         let what = format!("back in normal mode, the last of {}", back.count());
-        events.push(note(last.at, last.station, what, Kind::Sequence));
+        events.push(note(last.at, last.station, what, EventKind::Sequence));
     }
 }
 

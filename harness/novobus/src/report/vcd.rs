@@ -10,7 +10,7 @@
 //! | 5 | check sequence |
 //! | 6 | lost, or no telegram |
 
-use crate::report::walk::{Reader, SenderState};
+use crate::report::walk::{LinkReader, SenderState};
 use harness_bench::report::pcapng::name;
 use harness_bench::report::vcd::{self, Drawing, DrawnLine, Signals};
 use harness_proto::line::Rate;
@@ -36,7 +36,7 @@ pub(crate) fn write(
     };
     let mut wires = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
-        for (link, mut reader) in trace.channels.iter().zip(Reader::all(trace)) {
+        for (link, mut reader) in trace.channels.iter().zip(LinkReader::all(trace)) {
             // `98->97` as a word that every program takes for a name.
             let name = name(ring, link)
                 .replace("->", "_to_")

@@ -66,7 +66,7 @@ pub(crate) struct ByteSeen<'t> {
 }
 
 /// Reads one link of a trace byte by byte: its bytes, and what its sender remarked.
-pub(crate) struct Reader<'t> {
+pub(crate) struct LinkReader<'t> {
     observer: Observer,
     /// Reads what was sent; a trace that knows what drives remarked knows that as well.
     sender: Observer,
@@ -79,7 +79,7 @@ pub(crate) struct Reader<'t> {
     next: usize,
 }
 
-impl<'t> Reader<'t> {
+impl<'t> LinkReader<'t> {
     /// For every link of a trace.
     pub(crate) fn all(trace: &'t Trace) -> Vec<Self> {
         let known = !trace.remarks.is_empty();

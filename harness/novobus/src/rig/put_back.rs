@@ -61,7 +61,7 @@ type Values = BTreeMap<(Axis, Place), u16>;
 
 /// What the drives of a rig held before the first scenario that may change it.
 #[derive(Debug, Default)]
-pub(super) struct Before {
+pub(super) struct HeldValues {
     values: Values,
     /// The drives that were in an error which is not of the bus, with its code; `None` before the first scenario.
     errors: Option<BTreeMap<Axis, u16>>,
@@ -285,7 +285,7 @@ pub(super) fn remember(
 /// Puts back what scenarios have changed since drives were [read](remember), where they were seen in their safe state. Returns what is
 /// left to say.
 pub(crate) fn put_back(session: &mut Session, safe: bool) -> Vec<String> {
-    let Before {
+    let HeldValues {
         values,
         errors,
         earlier,

@@ -205,7 +205,7 @@ impl<'s> Run<'s> {
             self.session.link().reset_after_denial();
             way.examine_after_denial(self.session.rig());
         }
-        let mut both = Both {
+        let mut both = KeepingSink {
             events: Vec::new(),
             sink,
         };
@@ -587,12 +587,12 @@ impl Sink for Beating {
 }
 
 /// Keeps events and hands them on.
-struct Both<'s> {
+struct KeepingSink<'s> {
     events: Vec<LinkEvent>,
     sink: Option<&'s mut dyn Sink>,
 }
 
-impl Sink for Both<'_> {
+impl Sink for KeepingSink<'_> {
     fn take(&mut self, event: &LinkEvent) {
         self.events.push(event.clone());
         if let Some(sink) = &mut self.sink {

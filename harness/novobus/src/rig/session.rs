@@ -5,7 +5,7 @@ use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
 use super::open::{open as open_ends, stated_rate};
-use super::put_back::{Before, put_back};
+use super::put_back::{HeldValues, put_back};
 use super::{limits, sim};
 use crate::driver::{Axis, count_behind};
 use crate::gate::guard_rings;
@@ -50,7 +50,7 @@ pub(crate) struct RingDrives {
     /// A ring behind in-band marks answered as one that knows none.
     damages_ff: bool,
     /// What scenarios may change, before they do.
-    pub(super) before: Before,
+    pub(super) before: HeldValues,
 }
 
 /// A rig in use.
@@ -180,7 +180,7 @@ fn guarded(
         ill_as_well: options.ill_as_well,
         opening: None,
         damages_ff: false,
-        before: Before::default(),
+        before: HeldValues::default(),
     };
     (drives, guard_rings(ends, limits), locks)
 }

@@ -36,7 +36,7 @@ const HEAD: &str = "\
 /// The scenarios that find a deviation, the quickest of each kind.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Found {
+struct FindingScenarios {
     wire: Option<String>,
     faults: Option<String>,
     look: Option<String>,
@@ -51,7 +51,7 @@ enum Means {
 }
 
 /// A scenario that passes without a deviation, as it is or with drives of the model `nd21` only.
-struct Candidate {
+struct PassingScenario {
     name: String,
     text: String,
     /// Where header lines can be put, and those that go there.
@@ -65,7 +65,7 @@ struct Candidate {
     cost: u64,
 }
 
-impl Candidate {
+impl PassingScenario {
     fn new(entry: &RingScenario, nd21: bool) -> Option<Self> {
         let text = entry.source.text.to_string();
         let at = text.find("\nring ")? + 1;
@@ -144,14 +144,16 @@ fn file() -> PathBuf {
 fn search() -> String {
     let scenarios = scenarios();
     let candidates = [false, true].map(|nd21| {
-        let candidates = scenarios.iter().filter_map(|s| Candidate::new(s, nd21));
+        let candidates = scenarios
+            .iter()
+            .filter_map(|s| PassingScenario::new(s, nd21));
         let mut candidates: Vec<_> = candidates.collect();
         candidates.sort_by_key(|candidate| candidate.cost);
         candidates
     });
     let mut text = HEAD.to_owned();
     for deviation in DEVIATIONS.all() {
-        let mut by = Found::default();
+        let mut by = FindingScenarios::default();
         for candidate in &candidates[usize::from(deviation.is_behind_the_bus())] {
             let place = match candidate.finds(deviation) {
                 Some(Means::Wire) => &mut by.wire,
@@ -180,7 +182,7 @@ fn every_deviation_is_found() {
         std::fs::write(file(), search()).expect("a file");
     }
     let text = std::fs::read_to_string(file()).expect("a file");
-    let found: BTreeMap<String, Found> = toml::from_str(&text).expect("a table");
+    let found: BTreeMap<String, FindingScenarios> = toml::from_str(&text).expect("a table");
     let scenarios = scenarios();
     let mut unseen = Vec::new();
     for deviation in DEVIATIONS.all() {
@@ -194,7 +196,7 @@ fn every_deviation_is_found() {
         for (name, means) in means.into_iter().filter_map(|(name, m)| Some((name?, m))) {
             let entry = scenarios.iter().find(|entry| entry.short_name() == name);
             let entry = entry.unwrap_or_else(|| panic!("no scenario {name}"));
-            let candidate = Candidate::new(entry, deviation.is_behind_the_bus());
+            let candidate = PassingScenario::new(entry, deviation.is_behind_the_bus());
             let found = candidate.and_then(|candidate| candidate.finds(deviation));
             assert_eq!(found, Some(means), "{}: {name}", deviation.name);
             any = true;

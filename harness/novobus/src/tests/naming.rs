@@ -10,7 +10,7 @@ use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::link::SimulatedLink;
 use crate::qualify::{
-    Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
+    Culprit, Meant, Named, Pinned, ProbeAnswer, RingSeen, Sighting, Whose, agreed, answer,
     conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
 use crate::rig::{Way, play_one};
@@ -135,7 +135,7 @@ fn played_in_time(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
 
 /// What a qualification makes of a ring.
 #[derive(Debug, Default)]
-struct Verdict {
+struct NamingVerdict {
     /// Whether it differed from the model at all.
     differs: bool,
     named: Vec<Named>,
@@ -147,12 +147,12 @@ struct Verdict {
 
 /// What a ring was seen to do.
 #[derive(Default)]
-struct Play {
+struct RingConduct {
     differing: Vec<Vec<Conversation>>,
     alike: Vec<Vec<Conversation>>,
 }
 
-impl Play {
+impl RingConduct {
     /// Plays a scenario on such a ring, and gives where it differed from the model.
     fn play(&mut self, link: &SimulatedLink, plan: &Plan) -> (bool, Option<Sighting>) {
         let right = twin(&[]).expect("a ring");
@@ -182,9 +182,9 @@ impl Play {
 }
 
 /// What a qualification makes of a ring with these lines.
-fn verdict(lines: &[String]) -> Verdict {
+fn verdict(lines: &[String]) -> NamingVerdict {
     let link = twin(lines).expect("a ring").into_link();
-    let mut play = Play::default();
+    let mut play = RingConduct::default();
     let mut sightings = Vec::new();
     for (number, plan) in plans().iter().enumerate() {
         let (_, sighting) = play.play(&link, plan);
@@ -212,7 +212,7 @@ fn verdict(lines: &[String]) -> Verdict {
     };
     let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"), &pinned);
     let (culprit, named) = agreed(culprit, &name(&seen_all, &twin_of));
-    Verdict {
+    NamingVerdict {
         differs: !play.differing.is_empty(),
         named,
         culprit,
@@ -236,7 +236,7 @@ enum End {
 fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
     let drives = whose.map_or("0..last".to_owned(), |drive| drive.to_string());
     let lines = [format!("drive {drives} deviates {}", planted.name)];
-    let Verdict {
+    let NamingVerdict {
         differs,
         named,
         culprit,
@@ -335,7 +335,7 @@ fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
     let link = twin(&wrong).expect("a ring").into_link();
     let right = twin(&wrong[..1]).expect("a ring");
     let all = played_in_time(&named_plan(name), &link);
-    let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
+    let (_, sighting) = RingConduct::default().judge(all, link.byte_time(), right);
     let sighting = sighting.unwrap_or_else(|| panic!("{lines}: {name} shows nothing"));
     let sightings = [(name.to_owned(), sighting)];
     let asked = questions(DRIVES, &sightings);
@@ -347,7 +347,7 @@ fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
 }
 
 /// The deviations that explain what was played on a ring whose right drives have these lines.
-fn names_of(play: &Play, lines: &[String]) -> Vec<&'static str> {
+fn names_of(play: &RingConduct, lines: &[String]) -> Vec<&'static str> {
     let seen = RingSeen {
         drives: DRIVES,
         suspects: &[],
@@ -368,7 +368,7 @@ fn what_is_right_refutes_a_name() {
         "drive 1 deviates ram-bit-stuck-at-0".to_owned(),
     ];
     let link = twin(&wrong).expect("a ring").into_link();
-    let mut play = Play::default();
+    let mut play = RingConduct::default();
     for name in ["10.2-march", "qualify-cells"] {
         let all = played_in_time(&named_plan(name), &link);
         let _sighting = play.judge(all, link.byte_time(), twin(&wrong[..1]).expect("a ring"));
@@ -385,7 +385,7 @@ fn what_is_right_refutes_a_name() {
 fn what_is_right_elsewhere_refutes_a_name() {
     let wrong = ["drive 1 deviates checksum-zero-accepted".to_owned()];
     let link = twin(&wrong).expect("a ring").into_link();
-    let mut play = Play::default();
+    let mut play = RingConduct::default();
     let mut names = Vec::new();
     // C0+42+FE = 200, so 01 is right.
     for check in ["00", "2F"] {
@@ -419,7 +419,7 @@ fn what_is_right_before_refutes_a_name() {
     };
     assert_eq!(data.byte, 0xFF);
     (data.byte, sum.byte) = (0x7F, sum.byte.wrapping_add(0x80));
-    let mut play = Play::default();
+    let mut play = RingConduct::default();
     let _sighting = play.judge(all, link.byte_time(), twin(&lines).expect("a ring"));
     assert_eq!((play.differing.len(), play.alike.len()), (1, 0));
     let names = names_of(&play, &lines);
@@ -476,7 +476,7 @@ fn the_section_is_that_of_the_broken_rule() {
         let link = twin(&lines).expect("a ring").into_link();
         let right = twin(&lines[..1]).expect("a ring");
         let all = played_in_time(&named_plan(name), &link);
-        let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
+        let (_, sighting) = RingConduct::default().judge(all, link.byte_time(), right);
         let found = sighting.map(|sighting| (sighting.meant, sighting.section));
         assert_eq!(found, Some((meant, section)), "{deviation}");
     }
@@ -603,7 +603,7 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
             let found = answer(probe, DRIVES, &seen, THROUGH_A_PORT, &twin_of).expect("rings");
             let manual = &hypotheses(probe.property, DRIVES)[0];
             let is_manual =
-                matches!(&found, Answer::Settled { header, .. } if *header == manual.header);
+                matches!(&found, ProbeAnswer::Settled { header, .. } if *header == manual.header);
             assert!(is_manual, "{lines:?}: {}: {found:?}", probe.property);
         }
     }
@@ -626,7 +626,7 @@ fn sighted_by(
     let link = twin(&drives).expect("a ring").into_link();
     let all = played_in_time(&plan(&link), &link);
     let model = twin(&right).expect("a ring");
-    let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
+    let (_, sighting) = RingConduct::default().judge(all, link.byte_time(), model);
     sighting.map(|sighting| (sighting.meant, sighting.section))
 }
 

@@ -5,7 +5,8 @@ use crate::language::read::RingScenario;
 use crate::language::run::over_bus::{play_over_bus, start_anew};
 use crate::language::syntax::Header;
 use crate::qualify::{
-    Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
+    Hypothesis, Probe, ProbeAnswer, ProbeTarget, RingSeen, answer, explaining, hypotheses, name,
+    probes,
 };
 use crate::simulate::bench;
 use crate::tests::built_in_sources;
@@ -132,7 +133,7 @@ fn a_record_is_played_again() {
 #[test]
 fn probes_tell_properties() {
     for probe in probes(3).expect("no mistakes") {
-        if probe.asked != Asked::Ring {
+        if probe.asked != ProbeTarget::Ring {
             continue;
         }
         let alike = |h: &Hypothesis| h.header.setups.len() == 1;
@@ -141,7 +142,7 @@ fn probes_tell_properties() {
             let header = hypothesis.header.clone();
             let answer = answered(3, &probe, EXACT, &header);
             let span = None;
-            let settled = Answer::Settled {
+            let settled = ProbeAnswer::Settled {
                 value,
                 header,
                 span,
@@ -173,7 +174,7 @@ fn a_time_out_is_told_from_the_wait_behind_it() {
                 let value = format!("{time_out}ms");
                 let header = header(&lines);
                 found
-                    == Answer::Settled {
+                    == ProbeAnswer::Settled {
                         value,
                         header,
                         span: None,
@@ -203,7 +204,7 @@ fn a_long_ring_is_asked_for_its_time_outs() {
         let probe = probes.iter().find(|probe| probe.property == property);
         let own_header = header(&[format!("drive 0..last property {property} = {value}")]);
         let answer = answered(40, probe.expect("a probe"), EXACT, &own_header);
-        let is_it = matches!(&answer, Answer::Settled { header, .. } if *header == own_header);
+        let is_it = matches!(&answer, ProbeAnswer::Settled { header, .. } if *header == own_header);
         assert!(is_it, "{property} = {value}: {answer:?}");
     }
 }
@@ -214,7 +215,7 @@ fn header(lines: &[String]) -> Header {
 }
 
 /// The answer to a probe of a ring of `drives` drives with this header.
-fn answered(drives: u8, probe: &Probe, exactness: Exactness, header: &Header) -> Answer {
+fn answered(drives: u8, probe: &Probe, exactness: Exactness, header: &Header) -> ProbeAnswer {
     let entries = probe.entries.iter();
     let seen = entries.map(|entry| {
         let (_, mut link) = model_of(drives, &header.lines());
@@ -245,7 +246,7 @@ fn what_a_drive_leaves_open_is_settled() {
         ("i2t-time", 15_000, 14_990, 15_010),
     ];
     for (property, is, from, to) in times {
-        let Answer::Settled { value, header, .. } = asked(property, &format!("{is}ms"), READY)
+        let ProbeAnswer::Settled { value, header, .. } = asked(property, &format!("{is}ms"), READY)
         else {
             panic!("{property} = {is} is not settled");
         };
@@ -274,7 +275,7 @@ fn what_a_drive_leaves_open_is_settled() {
     ];
     for (property, word) in words {
         let answer = asked(property, word, READY);
-        let is_it = matches!(&answer, Answer::Settled { value, .. } if value == word);
+        let is_it = matches!(&answer, ProbeAnswer::Settled { value, .. } if value == word);
         assert!(is_it, "{property} = {word}: {answer:?}");
     }
 }
@@ -284,23 +285,26 @@ fn what_a_drive_leaves_open_is_settled() {
 #[test]
 fn a_motor_that_has_not_its_peak_current_settles_nothing() {
     let answer = asked("i2t-time", "2000ms", "drive 0..last input GPIN3 low");
-    assert_eq!(answer, Answer::NoDifference);
+    assert_eq!(answer, ProbeAnswer::NoDifference);
     let ignores = format!("{READY}\ndrive 1 deviates current-limit-ignored");
-    assert_eq!(asked("i2t-time", "2000ms", &ignores), Answer::Unexplained);
+    assert_eq!(
+        asked("i2t-time", "2000ms", &ignores),
+        ProbeAnswer::Unexplained
+    );
     let never = format!("{READY}\ndrive 1 deviates i2t-never-limits");
     let answer = asked("i2t-time", "2000ms", &never);
-    assert!(matches!(answer, Answer::NotDone(_)), "{answer:?}");
+    assert!(matches!(answer, ProbeAnswer::NotDone(_)), "{answer:?}");
 }
 
 /// ND21 5.3.3: released and started.
 const READY: &str = "drive 0..last input GPIN3 GPIN5 high";
 
 /// What drive 1 of three answers to the probe for a property, where it is so and these lines stand in the header.
-fn asked(property: &str, value: &str, lines: &str) -> Answer {
+fn asked(property: &str, value: &str, lines: &str) -> ProbeAnswer {
     let probes = probes(3).expect("no mistakes").into_iter();
     let mut of_property = probes.filter(|probe| probe.property == property);
     let probe = of_property
-        .find(|probe| matches!(probe.asked, Asked::Drive(1, _)))
+        .find(|probe| matches!(probe.asked, ProbeTarget::Drive(1, _)))
         .expect("a probe");
     let so = format!("drive 0..last property {property} = {value}");
     // As on a rig, where the cells that a drive writes itself are not known.

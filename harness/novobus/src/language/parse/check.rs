@@ -14,7 +14,7 @@ use harness_proto::novobus::error::BusError;
 /// Reads the text after `?`.
 pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
     #[derive(Clone, Copy)]
-    enum Word {
+    enum CheckWord {
         Located,
         Within,
         Drive,
@@ -27,20 +27,20 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         Received,
     }
     let words = [
-        ("located", Word::Located),
-        ("within", Word::Within),
-        ("drive", Word::Drive),
-        ("drives", Word::Drive),
-        ("error", Word::Error),
-        ("corrected", Word::Corrected),
-        ("named", Word::Named),
-        ("ended", Word::Ended),
-        ("rules", Word::Rules),
-        ("sent", Word::Sent),
-        ("received", Word::Received),
+        ("located", CheckWord::Located),
+        ("within", CheckWord::Within),
+        ("drive", CheckWord::Drive),
+        ("drives", CheckWord::Drive),
+        ("error", CheckWord::Error),
+        ("corrected", CheckWord::Corrected),
+        ("named", CheckWord::Named),
+        ("ended", CheckWord::Ended),
+        ("rules", CheckWord::Rules),
+        ("sent", CheckWord::Sent),
+        ("received", CheckWord::Received),
     ];
     match named(scanner, &words, "a check")? {
-        Word::Located => {
+        CheckWord::Located => {
             scanner.eat_word("drive");
             let drive = one_drive(scanner)?;
             let within = if scanner.eat_word("within") {
@@ -50,17 +50,17 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             };
             Ok(Check::Located { drive, within })
         }
-        Word::Within => Ok(Check::Within(zeros(scanner)?)),
-        Word::Drive => Ok(Check::Drive(drive::check(scanner)?)),
-        Word::Error => {
+        CheckWord::Within => Ok(Check::Within(zeros(scanner)?)),
+        CheckWord::Drive => Ok(Check::Drive(drive::check(scanner)?)),
+        CheckWord::Error => {
             let error = error_code(scanner)?;
             required(scanner, &["at"])?;
             scanner.eat_word("drive");
             let drive = one_drive(scanner)?;
             Ok(Check::Error { error, drive })
         }
-        Word::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
-        Word::Named => {
+        CheckWord::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
+        CheckWord::Named => {
             let kinds = [("damaged", false), ("broken", true)];
             let broken = named(scanner, &kinds, "a fault of a link")?;
             let (ring, link, ends) = step::link(scanner)?;
@@ -71,15 +71,15 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
                 ends,
             })
         }
-        Word::Ended => {
+        CheckWord::Ended => {
             let ending = named(scanner, &Ending::NAMES, "a result of a job")?;
             Ok(Check::Ended(ending))
         }
-        Word::Rules => {
+        CheckWord::Rules => {
             required(scanner, &["kept"])?;
             Ok(Check::RulesKept(job::which_ring(scanner)?))
         }
-        Word::Sent => {
+        CheckWord::Sent => {
             let bytes = expression::sum(scanner)?;
             required(scanner, &["bytes", "byte"])?;
             let time = if scanner.eat_word("in") {
@@ -89,7 +89,7 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             };
             Ok(Check::Sent { bytes, time })
         }
-        Word::Received => {
+        CheckWord::Received => {
             let bytes = expression::sum(scanner)?;
             required(scanner, &["bytes", "byte"])?;
             Ok(Check::Received(bytes))

@@ -44,7 +44,7 @@ pub(crate) enum DriveLine {
 }
 
 #[derive(Clone, Copy)]
-enum Word {
+enum DriveWord {
     Memory,
     Eeprom,
     Property,
@@ -66,25 +66,25 @@ enum Word {
 }
 
 /// What can be set, and what can happen.
-const SETTINGS: [(&str, Word); 18] = [
-    ("memory", Word::Memory),
-    ("eeprom", Word::Eeprom),
-    ("property", Word::Property),
-    ("deviates", Word::Deviates),
-    ("model", Word::Model),
-    ("type", Word::Type),
-    ("input", Word::Input),
-    ("cam", Word::Cam),
-    ("analogue", Word::Analogue),
-    ("frequency", Word::Frequency),
-    ("cooler", Word::Cooler),
-    ("motor-sensor", Word::MotorSensor),
-    ("rail", Word::Rail),
-    ("resolver", Word::Resolver),
-    ("load", Word::Load),
-    ("rotor", Word::Rotor),
-    ("phases", Word::Phases),
-    ("power", Word::Power),
+const SETTINGS: [(&str, DriveWord); 18] = [
+    ("memory", DriveWord::Memory),
+    ("eeprom", DriveWord::Eeprom),
+    ("property", DriveWord::Property),
+    ("deviates", DriveWord::Deviates),
+    ("model", DriveWord::Model),
+    ("type", DriveWord::Type),
+    ("input", DriveWord::Input),
+    ("cam", DriveWord::Cam),
+    ("analogue", DriveWord::Analogue),
+    ("frequency", DriveWord::Frequency),
+    ("cooler", DriveWord::Cooler),
+    ("motor-sensor", DriveWord::MotorSensor),
+    ("rail", DriveWord::Rail),
+    ("resolver", DriveWord::Resolver),
+    ("load", DriveWord::Load),
+    ("rotor", DriveWord::Rotor),
+    ("phases", DriveWord::Phases),
+    ("power", DriveWord::Power),
 ];
 
 #[derive(Clone, Copy)]
@@ -145,59 +145,59 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
     })
 }
 
-fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<DriveLine, Problem> {
+fn setting(word: DriveWord, scanner: &mut Scanner<'_>) -> Result<DriveLine, Problem> {
     let one = |stimulus| Ok(DriveLine::Influence(Influence::Stimuli(vec![stimulus])));
     let number = |scanner: &mut Scanner<'_>, dimension, parts, least, most| {
         quantity::quantity(scanner, Some(dimension))?.whole(parts, least, most)
     };
     match word {
-        Word::Memory => {
+        DriveWord::Memory => {
             let place = place(scanner)?;
             let value = assigned(scanner, &place)?;
             Ok(DriveLine::Setup(SetupKind::Memory(place, value)))
         }
-        Word::Eeprom => {
+        DriveWord::Eeprom => {
             let place = eeprom_place(scanner)?;
             let value = assigned(scanner, &place)?;
             Ok(DriveLine::Setup(SetupKind::Eeprom(place, value)))
         }
-        Word::Property => Ok(DriveLine::Setup(property(scanner)?)),
-        Word::Deviates => Ok(DriveLine::Setup(SetupKind::Deviates(deviates(scanner)?))),
-        Word::Model => {
+        DriveWord::Property => Ok(DriveLine::Setup(property(scanner)?)),
+        DriveWord::Deviates => Ok(DriveLine::Setup(SetupKind::Deviates(deviates(scanner)?))),
+        DriveWord::Model => {
             let model = named(scanner, &Model::NAMES, "a drive model")?;
             Ok(DriveLine::Setup(SetupKind::Model(model)))
         }
-        Word::Type => device(scanner),
-        Word::Input => Ok(DriveLine::Influence(Influence::Stimuli(inputs(scanner)?))),
-        Word::Cam => one(cam(scanner)?),
-        Word::Analogue => {
+        DriveWord::Type => device(scanner),
+        DriveWord::Input => Ok(DriveLine::Influence(Influence::Stimuli(inputs(scanner)?))),
+        DriveWord::Cam => one(cam(scanner)?),
+        DriveWord::Analogue => {
             let millivolts = number(scanner, Dimension::Voltage, 1_000, -10, 10)?;
             one(Stimulus::Analogue(millivolts))
         }
-        Word::Frequency => {
+        DriveWord::Frequency => {
             let hertz = number(scanner, Dimension::Frequency, 1, 0, 1_000_000)?;
             one(Stimulus::Frequency(hertz.unsigned_abs()))
         }
-        Word::Cooler => {
+        DriveWord::Cooler => {
             let tenths = number(scanner, Dimension::Temperature, 10, -50, 200)?;
             one(Stimulus::Cooler(tenths))
         }
-        Word::MotorSensor => {
+        DriveWord::MotorSensor => {
             let ohms = number(scanner, Dimension::Resistance, 1, 0, MAX_OHM)?;
             one(Stimulus::MotorSensor(ohms.unsigned_abs()))
         }
-        Word::Rail => {
+        DriveWord::Rail => {
             let volts = number(scanner, Dimension::Voltage, 1, 0, 1_000)?;
             one(Stimulus::Rail(volts.unsigned_abs()))
         }
-        Word::Load => {
+        DriveWord::Load => {
             let milliamperes = number(scanner, Dimension::Current, 1_000, -100, 100)?;
             one(Stimulus::Load(milliamperes))
         }
-        Word::Resolver => one(Stimulus::Resolver(either(scanner, ["off", "on"])?)),
-        Word::Rotor => one(Stimulus::Jammed(either(scanner, ["free", "jammed"])?)),
-        Word::Phases => one(Stimulus::Short(either(scanner, ["sound", "shorted"])?)),
-        Word::Power => {
+        DriveWord::Resolver => one(Stimulus::Resolver(either(scanner, ["off", "on"])?)),
+        DriveWord::Rotor => one(Stimulus::Jammed(either(scanner, ["free", "jammed"])?)),
+        DriveWord::Phases => one(Stimulus::Short(either(scanner, ["sound", "shorted"])?)),
+        DriveWord::Power => {
             let on = either(scanner, ["off", "on"])?;
             Ok(DriveLine::Influence(Influence::Power(on)))
         }

@@ -15,17 +15,17 @@ pub(crate) struct Form {
     pub(crate) name: &'static str,
     pub(crate) kind: JobKind,
     cell: bool,
-    data: Data,
+    data: JobData,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Data {
+enum JobData {
     None,
     Read,
     Written,
 }
 
-const fn form(name: &'static str, kind: JobKind, cell: bool, data: Data) -> Form {
+const fn form(name: &'static str, kind: JobKind, cell: bool, data: JobData) -> Form {
     Form {
         name,
         kind,
@@ -35,19 +35,19 @@ const fn form(name: &'static str, kind: JobKind, cell: bool, data: Data) -> Form
 }
 
 pub(crate) const FORMS: [Form; 13] = [
-    form("read-byte", JobKind::ReadByte, true, Data::Read),
-    form("read-word", JobKind::ReadWord, true, Data::Read),
-    form("read-long", JobKind::ReadLong, true, Data::Read),
-    form("write-byte", JobKind::WriteByte, true, Data::Written),
-    form("write-word", JobKind::WriteWord, true, Data::Written),
-    form("and", JobKind::And, true, Data::Written),
-    form("or", JobKind::Or, true, Data::Written),
-    form("write-io", JobKind::WriteIo, false, Data::Written),
-    form("reset", JobKind::Reset, false, Data::None),
-    form("go", JobKind::Go, false, Data::None),
-    form("stop", JobKind::Stop, false, Data::None),
-    form("block", JobKind::Block, false, Data::None),
-    form("delete-error", JobKind::DeleteError, false, Data::None),
+    form("read-byte", JobKind::ReadByte, true, JobData::Read),
+    form("read-word", JobKind::ReadWord, true, JobData::Read),
+    form("read-long", JobKind::ReadLong, true, JobData::Read),
+    form("write-byte", JobKind::WriteByte, true, JobData::Written),
+    form("write-word", JobKind::WriteWord, true, JobData::Written),
+    form("and", JobKind::And, true, JobData::Written),
+    form("or", JobKind::Or, true, JobData::Written),
+    form("write-io", JobKind::WriteIo, false, JobData::Written),
+    form("reset", JobKind::Reset, false, JobData::None),
+    form("go", JobKind::Go, false, JobData::None),
+    form("stop", JobKind::Stop, false, JobData::None),
+    form("block", JobKind::Block, false, JobData::None),
+    form("delete-error", JobKind::DeleteError, false, JobData::None),
 ];
 
 /// Every name that a job can have.
@@ -132,8 +132,8 @@ fn operands(
         None
     };
     let data = match (form.data, &place) {
-        (Data::None, _) => None,
-        (Data::Read, _) if scanner.at_end() || scanner.peek() == Some(';') => None,
+        (JobData::None, _) => None,
+        (JobData::Read, _) if scanner.at_end() || scanner.peek() == Some(';') => None,
         (_, Some(place)) => Some(assigned(scanner, place)?),
         (_, None) => {
             equals(scanner)?;
@@ -161,7 +161,7 @@ fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let drive = one(scanner)?;
     let (place, data) = operands(form, scanner)?;
     let tolerance = match &data {
-        Some(data) if form.data == Data::Read => tolerance(scanner, data)?,
+        Some(data) if form.data == JobData::Read => tolerance(scanner, data)?,
         _ => None,
     };
     Ok(JobStep::Command {

@@ -227,9 +227,9 @@ pub(crate) struct NotReady {
 }
 
 impl NotReady {
-    fn new(cell: Before, unready: Unready, why: &str) -> Self {
+    fn new(cell: HeldCell, unready: Unready, why: &str) -> Self {
         let prefix = if cell.ring == 0 { "" } else { "2:" };
-        let Before { address, drive, .. } = cell;
+        let HeldCell { address, drive, .. } = cell;
         Self {
             unready,
             own_cell: is_own(address),
@@ -330,7 +330,7 @@ pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool>
     let mut any = Some(false);
     // Every ring is asked: the model reads the answers in the record.
     for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
-        let flags = together(link, of_ring, Before::read);
+        let flags = together(link, of_ring, HeldCell::read);
         let here = flags.map(|flags| flags.iter().any(monitors));
         any = any.zip(here).map(|(any, here)| any || here);
     }
@@ -338,8 +338,8 @@ pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool>
 }
 
 /// A cell in each of these drives.
-fn in_each(all: &[(usize, u8)], address: u16) -> Vec<Before> {
-    let cell = |&(ring, drive)| Before {
+fn in_each(all: &[(usize, u8)], address: u16) -> Vec<HeldCell> {
+    let cell = |&(ring, drive)| HeldCell {
         ring,
         drive,
         address,
@@ -407,7 +407,7 @@ fn comes_round(link: &mut dyn Link, ring: usize, bytes: &[u8], patience: Span) -
 /// Resets these drives of a ring. A check sequence follows each telegram, so that a drive in the middle of a telegram receives the next one
 /// whole (9.8). It also shows whether a drive opens the ring while it tests itself. If the first drive does not, the others are reset without
 /// waiting. If it does, each drive waits until the ring passes bytes again, because its answer is visible only then.
-fn reset_ring(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
+fn reset_ring(link: &mut dyn Link, cells: &[HeldCell]) -> Result<(), NotReady> {
     let Some((first, others)) = cells.split_first() else {
         return Ok(());
     };
@@ -429,7 +429,7 @@ fn reset_ring(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
 }
 
 /// Waits until a ring passes bytes again in which this drive was the last one to be reset.
-fn close(link: &mut dyn Link, cell: Before) -> Result<(), NotReady> {
+fn close(link: &mut dyn Link, cell: HeldCell) -> Result<(), NotReady> {
     let why = "it does not answer after its reset";
     match closes_again(link, cell.ring) {
         true => Ok(()),
@@ -439,7 +439,7 @@ fn close(link: &mut dyn Link, cell: Before) -> Result<(), NotReady> {
 
 /// Resets a drive, and returns whether the ring passes bytes right after it. A drive that gives no answer is asked once more when the ring
 /// passes bytes.
-fn reset_one(link: &mut dyn Link, cell: Before) -> Result<bool, NotReady> {
+fn reset_one(link: &mut dyn Link, cell: HeldCell) -> Result<bool, NotReady> {
     let reset =
         |link: &mut dyn Link| exchange(link, cell.ring, cell.drive, Command::ResetH8).is_some();
     if !(reset(link) || closes_again(link, cell.ring) && reset(link)) {
@@ -450,7 +450,7 @@ fn reset_one(link: &mut dyn Link, cell: Before) -> Result<bool, NotReady> {
 }
 
 /// Resets drives of a ring that passes bytes meanwhile.
-fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
+fn reset_at_once(link: &mut dyn Link, cells: &[HeldCell]) -> Option<()> {
     let Some(ring) = cells.first().map(|cell| cell.ring) else {
         return Some(());
     };
@@ -469,7 +469,7 @@ fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
 
 /// What a cell held before [`set_up`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Before {
+struct HeldCell {
     /// In which ring, counted from 0.
     ring: usize,
     drive: u8,
@@ -478,7 +478,7 @@ struct Before {
     data: u8,
 }
 
-impl Before {
+impl HeldCell {
     fn read(&self) -> Command {
         Command::ReadByte {
             address: self.address,
@@ -498,12 +498,12 @@ impl Before {
 ///
 /// # Errors
 /// The first cell that does not hold what it must, in a sentence.
-fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), NotReady> {
+fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<HeldCell>) -> Result<(), NotReady> {
     for (ring, drives, address, bytes) in plan.memory_setups() {
         let mut cells = Vec::new();
         for drive in drives {
             let contents = (address..=u16::MAX).zip(bytes);
-            cells.extend(contents.map(|(address, data)| Before {
+            cells.extend(contents.map(|(address, data)| HeldCell {
                 ring,
                 drive,
                 address,
@@ -521,7 +521,7 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
             .map(|(cell, held)| {
                 (
                     *cell,
-                    Before {
+                    HeldCell {
                         data: held,
                         ..*cell
                     },
@@ -542,7 +542,7 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
 ///
 /// # Errors
 /// The first cell that does not hold its previous contents, as a sentence.
-fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
+fn restore(link: &mut dyn Link, before: &[HeldCell]) -> Result<(), NotReady> {
     for ring in 0..2 {
         let mut bytes = CHECK_SEQUENCE.to_vec();
         for cell in before.iter().rev().filter(|cell| cell.ring == ring) {
@@ -577,7 +577,7 @@ fn own_bits(address: u16) -> u8 {
     cell_at(address).map_or(0, |known| known.read_only_bits)
 }
 
-fn read(link: &mut dyn Link, cell: Before) -> Result<u8, NotReady> {
+fn read(link: &mut dyn Link, cell: HeldCell) -> Result<u8, NotReady> {
     match exchange(link, cell.ring, cell.drive, cell.read()).as_deref() {
         Some([byte]) => Ok(*byte),
         _ => Err(NotReady::new(cell, Unready::NoAnswer, "no answer")),
@@ -585,10 +585,10 @@ fn read(link: &mut dyn Link, cell: Before) -> Result<u8, NotReady> {
 }
 
 /// What each of these cells holds, those of a ring together. Where not all answer it is each for itself, and a sentence for those that do not.
-fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> {
+fn read_all(link: &mut dyn Link, cells: &[HeldCell]) -> Vec<Result<u8, NotReady>> {
     let mut held = Vec::new();
     for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
-        match together(link, of_ring, Before::read) {
+        match together(link, of_ring, HeldCell::read) {
             Some(data) => held.extend(data.concat().into_iter().map(Ok)),
             None => held.extend(of_ring.iter().map(|cell| read(link, *cell))),
         }
@@ -600,9 +600,9 @@ fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> 
 ///
 /// # Errors
 /// The first one that does not answer, in a sentence.
-fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
+fn write_all(link: &mut dyn Link, cells: &[HeldCell]) -> Result<(), NotReady> {
     for of_ring in cells.chunk_by(|one, other| one.ring == other.ring) {
-        if together(link, of_ring, Before::write).is_some() {
+        if together(link, of_ring, HeldCell::write).is_some() {
             continue;
         }
         for cell in of_ring {
@@ -617,12 +617,12 @@ fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
 /// Sends a command for each of these cells of one ring, without waiting for each answer.
 fn together(
     link: &mut dyn Link,
-    cells: &[Before],
-    command: fn(&Before) -> Command,
+    cells: &[HeldCell],
+    command: fn(&HeldCell) -> Command,
 ) -> Option<Vec<Vec<u8>>> {
     let ring = cells.first()?.ring;
     let drives = link.drives(ring);
-    let exchange = |cell: &Before| Exchange::new(drives, cell.drive, command(cell));
+    let exchange = |cell: &HeldCell| Exchange::new(drives, cell.drive, command(cell));
     let exchanges: Option<Vec<_>> = cells.iter().map(exchange).collect();
     exchange_all(link, drives, ring, &exchanges?)
 }
@@ -631,7 +631,7 @@ fn together(
 ///
 /// # Errors
 /// The first one that does not, in a sentence.
-fn holds_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
+fn holds_all(link: &mut dyn Link, cells: &[HeldCell]) -> Result<(), NotReady> {
     for (cell, held) in cells.iter().zip(read_all(link, cells)) {
         let held = held?;
         if (held ^ cell.data) & !own_bits(cell.address) != 0 {

@@ -7,7 +7,7 @@ use harness_proto::time::Instant;
 
 /// The records of a run.
 #[derive(Default)]
-pub(crate) struct Recorder {
+pub(crate) struct CellRecorder {
     /// Every record, in order of their beginnings.
     pub(crate) records: Vec<CellRecord>,
     /// The records that go on: which, and when the cell is looked at next.
@@ -16,7 +16,7 @@ pub(crate) struct Recorder {
     looks: u64,
 }
 
-impl Recorder {
+impl CellRecorder {
     /// When a cell is looked at next.
     pub(crate) fn next(&self) -> Instant {
         let times = self.running.iter().map(|(_, at)| *at);

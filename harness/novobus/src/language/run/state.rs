@@ -2,7 +2,7 @@
 
 use super::Runner;
 use super::bytes::resolve;
-use super::record::Recorder;
+use super::record::CellRecorder;
 use crate::language::Novobus;
 use crate::language::plan::{PlannedStep, RingAct};
 use crate::language::syntax::Ending;
@@ -41,7 +41,7 @@ pub(crate) struct RingState {
 /// What is kept of all rings.
 pub struct RunState {
     pub(crate) rings: Vec<RingState>,
-    pub(crate) recorder: Recorder,
+    pub(crate) recorder: CellRecorder,
     /// Cells that were read over the bus, where the link does not show them.
     pub(crate) seen: BTreeMap<(usize, u8, u16), u8>,
     /// Drives that have just answered a telegram, where the link does not show the error mode.
@@ -70,7 +70,7 @@ impl RunState {
         };
         Self {
             rings: plan.rings.iter().map(ring).collect(),
-            recorder: Recorder::default(),
+            recorder: CellRecorder::default(),
             seen: BTreeMap::new(),
             answers: BTreeSet::new(),
             tapped: BTreeMap::new(),

@@ -103,9 +103,9 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
 
 /// Keeps what a run finds.
 #[derive(Default)]
-struct Found(Vec<String>);
+struct FindingLog(Vec<String>);
 
-impl Watcher<Case> for Found {
+impl Watcher<Case> for FindingLog {
     fn round(&mut self, _: u64, _: &Swarm) {}
 
     fn found(&mut self, finding: &Finding, file: &str) {
@@ -151,7 +151,7 @@ fn found(drives: &str, (seed, one_in): (u64, u64), cases: u64) -> Vec<String> {
         findings: 1_000,
         every: 1,
     };
-    let mut found = Found::default();
+    let mut found = FindingLog::default();
     let mut fuzz = FuzzRun::new(about, scope);
     if let Err(error) = fuzz.run(&mut target, None, &bounds, &mut found) {
         found.0.push(error.to_string());

@@ -1,6 +1,6 @@
 //! The classes of a ring of two beside a judge that knows nothing but the reference model.
 
-use crate::campaign::class::{CaseClass, CaseEvidence, Wrong};
+use crate::campaign::class::{CaseClass, CaseEvidence, WrongValue};
 use crate::campaign::fault::{FaultEffect, LineBit};
 use crate::campaign::find::find;
 use crate::campaign::{CaseFaults, CaseOutcome};
@@ -8,7 +8,7 @@ use harness_sim::novobus::reference;
 
 /// What a case is, by the reference model alone: no code of the simulator, the master or the campaign. It knows no
 /// time, so that it judges bits but the start bit.
-struct Judge {
+struct ReferenceJudge {
     sent: Vec<u8>,
     drives: Vec<reference::Drive>,
     heard: Vec<u8>,
@@ -16,7 +16,7 @@ struct Judge {
 
 /// What the judge can say.
 #[derive(Debug, PartialEq, Eq)]
-enum Verdict {
+enum CaseVerdict {
     /// The master hears what it hears without a fault, and every drive holds the same.
     Harmless,
     /// The master hears the same, and this cell of this drive is different.
@@ -25,7 +25,7 @@ enum Verdict {
     Noticed(Option<u8>),
 }
 
-impl Judge {
+impl ReferenceJudge {
     fn new() -> Self {
         let text = [
             "8A FE 82 55 13 FE E8",
@@ -62,7 +62,7 @@ impl Judge {
         )
     }
 
-    fn verdict(&self, faults: &[(usize, usize, reference::Fault)]) -> Verdict {
+    fn verdict(&self, faults: &[(usize, usize, reference::Fault)]) -> CaseVerdict {
         let (heard, drives) = self.listen(faults);
         let same = heard
             .iter()
@@ -76,7 +76,7 @@ impl Judge {
                 .take_while(|(byte, error)| *byte == last && !error)
                 .count()
                 >= 20;
-            return Verdict::Noticed(Some(last).filter(|last| spelled && *last < 2));
+            return CaseVerdict::Noticed(Some(last).filter(|last| spelled && *last < 2));
         }
         let sound = self.listen(&[]).1;
         let mut wrong = Vec::new();
@@ -86,9 +86,9 @@ impl Judge {
             wrong.extend(addresses.map(|address| (1 - place as u8, address)));
         }
         if wrong.is_empty() {
-            Verdict::Harmless
+            CaseVerdict::Harmless
         } else {
-            Verdict::Silent(wrong)
+            CaseVerdict::Silent(wrong)
         }
     }
 }
@@ -116,7 +116,7 @@ fn as_reference(case: &CaseFaults) -> Option<Vec<(usize, usize, reference::Fault
 /// in one byte, but for the start bit.
 #[test]
 fn an_independent_judge_agrees() {
-    let judge = Judge::new();
+    let judge = ReferenceJudge::new();
     let folder = tempfile::tempdir().expect("a folder");
     let bytes: String = judge.sent.iter().map(|b| format!(" {b:02X}")).collect();
     let scenario = format!(
@@ -158,13 +158,13 @@ fn an_independent_judge_agrees() {
 #[test]
 fn the_judge_finds_a_wrong_classification() {
     let case = CaseFaults::from_name("master->1:18:0+master->1:18:1", 2).expect("a case");
-    let judge = Judge::new();
+    let judge = ReferenceJudge::new();
     let silent = judge.verdict(&as_reference(&case).expect("bits"));
-    assert_eq!(silent, Verdict::Silent(vec![(0, 0xFF6A)]));
+    assert_eq!(silent, CaseVerdict::Silent(vec![(0, 0xFF6A)]));
     let right = CaseEvidence {
         confirmed: true,
         all_back: true,
-        wrong: vec![Wrong::Cell {
+        wrong: vec![WrongValue::Cell {
             drive: 0,
             address: 0xFF6A,
             value: 0x11,
@@ -194,7 +194,7 @@ fn the_judge_finds_a_wrong_classification() {
             ..right.clone()
         },
         CaseEvidence {
-            wrong: vec![Wrong::Cell {
+            wrong: vec![WrongValue::Cell {
                 drive: 1,
                 address: 0xFF6A,
                 value: 0x11,
@@ -217,35 +217,35 @@ fn the_judge_finds_a_wrong_classification() {
 }
 
 /// Whether class and evidence are what the judge says.
-fn check(case: &CaseFaults, outcome: &CaseOutcome, verdict: &Verdict) {
+fn check(case: &CaseFaults, outcome: &CaseOutcome, verdict: &CaseVerdict) {
     let place = || format!("{}: {verdict:?} {outcome:?}", case.name(2));
     let evidence = &outcome.evidence;
     let class = evidence.class(&case.links());
     assert_eq!(class, Ok(outcome.class), "{}", place());
     match verdict {
-        Verdict::Harmless => assert_eq!(outcome.class, CaseClass::Harmless, "{}", place()),
-        Verdict::Silent(cells) => {
+        CaseVerdict::Harmless => assert_eq!(outcome.class, CaseClass::Harmless, "{}", place()),
+        CaseVerdict::Silent(cells) => {
             assert_eq!(outcome.class, CaseClass::SilentCorruption, "{}", place());
-            let cell = |wrong: &Wrong| match wrong {
-                Wrong::Cell { drive, address, .. } => Some((*drive, *address)),
-                Wrong::Answer { .. } => None,
+            let cell = |wrong: &WrongValue| match wrong {
+                WrongValue::Cell { drive, address, .. } => Some((*drive, *address)),
+                WrongValue::Answer { .. } => None,
             };
             let mut found: Vec<_> = evidence.wrong.iter().filter_map(cell).collect();
             found.sort_unstable_by_key(|(drive, address)| (std::cmp::Reverse(*drive), *address));
             assert_eq!(&found, cells, "{}", place());
         }
-        Verdict::Noticed(None) => {
+        CaseVerdict::Noticed(None) => {
             // Data that are not compared may come back changed.
             let data = outcome.class == CaseClass::SilentCorruption
                 && evidence
                     .wrong
                     .iter()
-                    .all(|wrong| matches!(wrong, Wrong::Answer { .. }));
+                    .all(|wrong| matches!(wrong, WrongValue::Answer { .. }));
             assert!(evidence.noticed || data, "{}", place());
             // What is no drive's address can only be the master's own link.
             assert!(evidence.named.is_none_or(|link| link == 2), "{}", place());
         }
-        Verdict::Noticed(Some(drive)) => {
+        CaseVerdict::Noticed(Some(drive)) => {
             assert!(evidence.noticed, "{}", place());
             assert_eq!(evidence.named, Some(1 - usize::from(*drive)), "{}", place());
         }

@@ -3,7 +3,7 @@
 
 mod judge;
 
-use crate::campaign::class::{CaseClass, Wrong};
+use crate::campaign::class::{CaseClass, WrongValue};
 use crate::campaign::find::{find, names};
 use crate::campaign::pairs::Apart;
 use crate::campaign::report::{json, table};
@@ -291,7 +291,7 @@ fn a_replay_is_the_case() {
         let played = play(&plan, &mut link, AtMismatch::GoOn);
         assert!(played.remarks.is_empty(), "{name}: {:?}", played.remarks);
         for wrong in &outcome.evidence.wrong {
-            let Wrong::Cell {
+            let WrongValue::Cell {
                 drive,
                 address,
                 value,

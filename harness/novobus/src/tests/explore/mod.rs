@@ -76,11 +76,11 @@ fn about(setup: &RingSetup, seed: u64) -> FuzzSettings {
 
 /// Keeps the findings of a run.
 #[derive(Default)]
-struct Heard {
+struct FindingList {
     findings: Vec<Finding>,
 }
 
-impl Watcher<Case> for Heard {
+impl Watcher<Case> for FindingList {
     fn round(&mut self, _: u64, _: &Swarm) {}
 
     fn found(&mut self, finding: &Finding, _: &str) {
@@ -102,7 +102,7 @@ fn bounds(cases: u64, findings: usize) -> Bounds {
 /// A run on a ring of three; what was found, and after how many cases it ended.
 fn explore(setup: &RingSetup, seed: u64, bounds: &Bounds) -> (Vec<Finding>, FuzzRun, RunEnd) {
     let mut campaign = FuzzRun::new(about(setup, seed), scope(3));
-    let mut heard = Heard::default();
+    let mut heard = FindingList::default();
     let mut target = OnSim::new(setup.clone());
     let end = campaign.run(&mut target, None, bounds, &mut heard);
     (heard.findings, campaign, end.expect("a simulated ring"))

@@ -1,6 +1,6 @@
 //! Rigs of two rings: a case is with one of them, and the other one stays as it is (ND21 12.2).
 
-use super::{Heard, about, bounds, scope_of};
+use super::{FindingList, about, bounds, scope_of};
 use crate::explore::shrink::{Subject, shrink};
 use crate::explore::{
     Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
@@ -31,7 +31,7 @@ fn explore(setup: &RingSetup, seed: u64, cases: u64) -> (Vec<Finding>, FuzzRun) 
         ..about(setup, seed)
     };
     let mut campaign = FuzzRun::new(about, scope_of(2, Some(3)));
-    let mut heard = Heard::default();
+    let mut heard = FindingList::default();
     let mut target = OnSim::new(setup.clone());
     let end = campaign.run(&mut target, None, &bounds(cases, 1), &mut heard);
     end.expect("simulated rings");

@@ -1,8 +1,8 @@
 //! Runs: what they find, that they repeat, and that a rig that is late now and then finds nothing.
 
 use super::{
-    Difference, ExploreError, FuzzRun, Heard, Rehearsal, RunEnd, Target, Tried, about, bounds,
-    explore, planted, repeat, scope, seed,
+    Difference, ExploreError, FindingList, FuzzRun, Rehearsal, RunEnd, Target, Tried, about,
+    bounds, explore, planted, repeat, scope, seed,
 };
 use crate::explore::{Case, OnSim, RingSetup};
 use crate::twin::Symptom;
@@ -105,7 +105,7 @@ fn a_finding_is_seen_again() {
             wrong,
         };
         let mut campaign = FuzzRun::new(about(&RingSetup::default(), 1), scope(3));
-        let mut heard = Heard::default();
+        let mut heard = FindingList::default();
         let end = campaign.run(&mut target, None, &bounds(20, 9), &mut heard);
         assert_eq!(end.expect("a ring"), RunEnd::Cases);
         assert_eq!(campaign.findings(), findings);
@@ -124,7 +124,7 @@ fn the_wire_budget_holds() {
         ..bounds(u64::MAX, 1)
     };
     let mut target = OnSim::new(setup);
-    let end = campaign.run(&mut target, None, &bounds, &mut Heard::default());
+    let end = campaign.run(&mut target, None, &bounds, &mut FindingList::default());
     assert_eq!(end.expect("a ring"), RunEnd::Wire);
     let used = campaign.progress().wire_ns;
     assert!(

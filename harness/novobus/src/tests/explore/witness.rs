@@ -1,6 +1,6 @@
 //! Whole ND21s without a model beside them: the witnesses find nothing where nothing is wrong, and most of what is.
 
-use super::{Heard, about, bounds, repeat, scope, seed};
+use super::{FindingList, about, bounds, repeat, scope, seed};
 use crate::explore::{Case, Finding, FuzzRun, OnSim, RingSetup, Spice};
 use harness_bench::explore::{Differing as _, FuzzCase as _, Planted};
 
@@ -22,7 +22,7 @@ fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, 
     let mut scope = scope(3);
     scope.spices = Spice::NAMES.iter().map(|(_, spice)| *spice).collect();
     let mut campaign = FuzzRun::new(about(&setup, seed), scope);
-    let mut heard = Heard::default();
+    let mut heard = FindingList::default();
     let mut target = OnSim::new(setup);
     let end = campaign.run(&mut target, None, &bounds(cases, 1), &mut heard);
     end.expect("a simulated ring");
