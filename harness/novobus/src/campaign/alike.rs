@@ -6,7 +6,7 @@
 
 use super::class::CaseEvidence;
 use super::sharing::{Fork, Front, Sharing};
-use crate::campaign::fault::{CaseFaults, Injected};
+use crate::campaign::fault::{CaseFaults, InjectedFault};
 use std::collections::{BTreeMap, HashMap};
 
 /// Pairs of which the same comes.
@@ -28,7 +28,7 @@ type Places = HashMap<(Fork, bool), usize>;
 
 /// Counts a case for its fork.
 fn add(forks: &mut Places, all: &mut Forks, fork: Fork, case: CaseFaults) {
-    let place = |fault: &Injected| (fault.link, fault.byte);
+    let place = |fault: &InjectedFault| (fault.link, fault.byte);
     let one_byte = case.second.as_ref().map(place) == Some(place(&case.first));
     let place = *forks.entry((fork, one_byte)).or_insert(all.len());
     match all.get_mut(place) {
@@ -45,7 +45,7 @@ impl Sharing<'_> {
     /// That of `found`.
     pub(crate) fn pairs<E>(
         &mut self,
-        singles: &[Injected],
+        singles: &[InjectedFault],
         link: usize,
         wanted: &dyn Fn(usize) -> bool,
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
@@ -56,7 +56,7 @@ impl Sharing<'_> {
         let wanted = |place: &usize| wanted(from + place);
         self.pairs_within(on_link, &wanted, found)?;
         // Faults that last longer have a longer opening.
-        let mut by_length: BTreeMap<usize, Vec<Injected>> = BTreeMap::new();
+        let mut by_length: BTreeMap<usize, Vec<InjectedFault>> = BTreeMap::new();
         for place in (0..on_link.len()).filter(&wanted) {
             let lasts = self.lasts(&on_link[place], None);
             by_length.entry(lasts).or_default().push(on_link[place]);
@@ -70,7 +70,7 @@ impl Sharing<'_> {
     /// Pairs of faults of one link, of which the second is `wanted`.
     fn pairs_within<E>(
         &mut self,
-        on_link: &[Injected],
+        on_link: &[InjectedFault],
         wanted: &impl Fn(&usize) -> bool,
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -100,15 +100,15 @@ impl Sharing<'_> {
     /// Pairs of a fault of `before` and one of `alike`, which are on one link behind and last equally long.
     fn pairs_across<E>(
         &mut self,
-        before: &[Injected],
-        alike: &[Injected],
+        before: &[InjectedFault],
+        alike: &[InjectedFault],
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let Some(any) = alike.first() else {
             return Ok(());
         };
         let mut places: HashMap<Front, usize> = HashMap::new();
-        let mut fronts: Vec<(Front, Injected, u64)> = Vec::new();
+        let mut fronts: Vec<(Front, InjectedFault, u64)> = Vec::new();
         for first in before {
             let lasts = self.lasts(first, Some(any));
             let Some(front) = self.damaged(lasts, first) else {
@@ -143,7 +143,7 @@ impl Sharing<'_> {
     }
 
     /// How a front forks by each of these faults of one link.
-    fn forks(&mut self, front: Front, faults: &[Injected]) -> Forks {
+    fn forks(&mut self, front: Front, faults: &[InjectedFault]) -> Forks {
         let (mut forks, mut all) = (Places::new(), Forks::new());
         for second in faults {
             if let Some(fork) = self.fork(front, second.link, [second]) {

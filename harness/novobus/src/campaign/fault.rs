@@ -55,7 +55,7 @@ pub(crate) enum FaultEffect {
 
 /// One fault: what, on which link, at which byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Injected {
+pub(crate) struct InjectedFault {
     /// The link, counted from the master's outgoing one.
     pub link: usize,
     /// The byte that its transmitter sends, counted from 1.
@@ -220,14 +220,14 @@ impl FromStr for FaultEffect {
 /// The faults of one case: one, or two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct CaseFaults {
-    pub first: Injected,
+    pub first: InjectedFault,
     /// The second, where there are two.
-    pub second: Option<Injected>,
+    pub second: Option<InjectedFault>,
 }
 
 impl CaseFaults {
     /// The faults, in order.
-    pub(crate) fn faults(&self) -> impl Iterator<Item = &Injected> {
+    pub(crate) fn faults(&self) -> impl Iterator<Item = &InjectedFault> {
         std::iter::once(&self.first).chain(&self.second)
     }
 
@@ -252,12 +252,12 @@ impl CaseFaults {
     /// # Errors
     /// What is wrong with the name, in a sentence.
     pub(crate) fn from_name(name: &str, drives: u8) -> Result<Self, String> {
-        let one = |text: &str| -> Option<Injected> {
+        let one = |text: &str| -> Option<InjectedFault> {
             let mut parts = text.splitn(3, ':');
             let link = link_place(drives, parts.next()?.parse::<LinkName>().ok()?)?;
             let byte = parts.next()?.parse().ok().filter(|byte| *byte > 0)?;
             let what = parts.next()?.parse().ok()?;
-            Some(Injected { link, byte, what })
+            Some(InjectedFault { link, byte, what })
         };
         let wrong = |text: &str| {
             format!(

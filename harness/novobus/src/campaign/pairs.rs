@@ -1,6 +1,6 @@
 //! Two faults in a conversation: every pair of a campaign's cases, or a sample of them.
 
-use super::fault::{CaseFaults, Injected};
+use super::fault::{CaseFaults, InjectedFault};
 use super::file::{CampaignFile, MAX_CASES, Pairs};
 use super::plan::cases;
 use super::run::{Campaign, CaseOutcome, Contradiction};
@@ -135,7 +135,7 @@ fn in_threads<W>(
 
 impl Campaign {
     /// Its cases, where they are all single faults.
-    fn singles(&self) -> Result<Vec<Injected>, PairsError> {
+    fn singles(&self) -> Result<Vec<InjectedFault>, PairsError> {
         if self.file.pairs.is_some() || self.file.sample.is_some() {
             return Err(PairsError::NoSingles(self.name.clone()));
         }
@@ -269,7 +269,7 @@ impl Campaign {
 
     fn played_pairs(
         &self,
-        singles: &[Injected],
+        singles: &[InjectedFault],
         seed: Option<u32>,
         counts: &PairCounts,
     ) -> PlayedPairs {

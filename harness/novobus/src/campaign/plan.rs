@@ -1,6 +1,6 @@
 //! The list of cases: a pure function of a campaign file and the ring and conversation that it is for.
 
-use super::fault::{CaseFaults, FaultEffect, Injected, LineBit, link_place};
+use super::fault::{CaseFaults, FaultEffect, InjectedFault, LineBit, link_place};
 use super::file::{CampaignFile, FaultFamily, MAX_CASES, Pairs, hex};
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -67,7 +67,7 @@ pub(crate) fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults
 }
 
 /// Every fault at every byte of every link that the file names.
-fn singles(file: &CampaignFile, shape: &Shape) -> Vec<Injected> {
+fn singles(file: &CampaignFile, shape: &Shape) -> Vec<InjectedFault> {
     let mut links: Vec<usize> = match &file.links {
         Some(links) => links
             .iter()
@@ -86,7 +86,7 @@ fn singles(file: &CampaignFile, shape: &Shape) -> Vec<Injected> {
     let mut all = Vec::new();
     for link in links {
         for byte in first..=last {
-            all.extend(whats.iter().map(|&what| Injected { link, byte, what }));
+            all.extend(whats.iter().map(|&what| InjectedFault { link, byte, what }));
         }
     }
     all
@@ -149,7 +149,7 @@ impl Group {
         }
     }
 
-    fn case(&self, index: u64, singles: &[Injected]) -> CaseFaults {
+    fn case(&self, index: u64, singles: &[InjectedFault]) -> CaseFaults {
         let place = |range: &Range<usize>, index: u64| {
             singles[range.start + usize::try_from(index).unwrap_or(usize::MAX)]
         };
@@ -181,7 +181,7 @@ impl Group {
 }
 
 /// Which pairs there are.
-fn groups(pairs: Pairs, singles: &[Injected], shape: &Shape) -> Vec<Group> {
+fn groups(pairs: Pairs, singles: &[InjectedFault], shape: &Shape) -> Vec<Group> {
     if pairs == Pairs::Any {
         return vec![Group::Within(0..singles.len())];
     }

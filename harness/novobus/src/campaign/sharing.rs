@@ -8,7 +8,7 @@
 use super::by_manual::{ByManual, Wire};
 use super::class::CaseEvidence;
 use super::sound::DrivesBeyondBus;
-use crate::campaign::fault::{CaseFaults, Injected};
+use crate::campaign::fault::{CaseFaults, InjectedFault};
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_sim::novobus::cells::Cells;
@@ -55,7 +55,7 @@ pub(crate) struct Sharing<'a> {
     /// Fronts by where they fork from the one without a fault.
     forks: HashMap<Fork, Front>,
     /// The same by the faults, for which nothing is to be worked out.
-    damaged: BTreeMap<(usize, Injected), Front>,
+    damaged: BTreeMap<(usize, InjectedFault), Front>,
     outcomes: HashMap<Fork, Rc<CaseEvidence>>,
     /// Whether drives hold what they hold without a fault, by the numbers of their states.
     compared: RefCell<Vec<Option<bool>>>,
@@ -178,7 +178,7 @@ impl<'a> Sharing<'a> {
         &mut self,
         front: Front,
         link: usize,
-        faults: impl IntoIterator<Item = &'f Injected>,
+        faults: impl IntoIterator<Item = &'f InjectedFault>,
     ) -> Option<Fork> {
         let faults = faults.into_iter().flat_map(|fault| {
             let all = fault.what.on_link().into_iter();
@@ -194,7 +194,7 @@ impl<'a> Sharing<'a> {
     }
 
     /// For how many byte times one or two faults last.
-    pub(super) fn lasts(&self, first: &Injected, second: Option<&Injected>) -> usize {
+    pub(super) fn lasts(&self, first: &InjectedFault, second: Option<&InjectedFault>) -> usize {
         self.of.lasts(&CaseFaults {
             first: *first,
             second: second.copied(),
@@ -213,7 +213,7 @@ impl<'a> Sharing<'a> {
     }
 
     /// The front in which one fault has happened.
-    pub(super) fn damaged(&mut self, lasts: usize, fault: &Injected) -> Option<Front> {
+    pub(super) fn damaged(&mut self, lasts: usize, fault: &InjectedFault) -> Option<Front> {
         if let Some(front) = self.damaged.get(&(lasts, *fault)) {
             return Some(*front);
         }

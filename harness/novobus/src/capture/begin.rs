@@ -191,7 +191,7 @@ fn later(octets: &[LineByte], start: Instant) -> &[LineByte] {
 
 /// What a capture shows of what was set before its first byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum ShownBeginning {
     /// At this time every drive was in normal mode, and nothing in front of the capture matters any more.
     From {
         at: Instant,
@@ -205,7 +205,7 @@ pub(super) enum Shown {
 }
 
 /// When each ring has shown that its drives are in normal mode.
-pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
+pub(super) fn shown(capture: &Capture, tolerance: Span) -> ShownBeginning {
     let rings = capture.traces.iter().filter_map(|ring| {
         let find = |is_end: fn(&Channel) -> bool| ring.channels.iter().find(|link| is_end(link));
         let first = find(|link| link.from.is_none())?;
@@ -213,17 +213,19 @@ pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
         (!first.octets().is_empty())
             .then(|| Beginning::of(capture, tolerance, ring, first, last).shown())
     });
-    let nothing = Shown::From {
+    let nothing = ShownBeginning::From {
         at: Instant::START,
         lost: false,
     };
     rings.fold(nothing, |all, next| match (all, next) {
-        (Shown::Wrong, _) | (_, Shown::Wrong) => Shown::Wrong,
-        (Shown::From { at: a, lost: b }, Shown::From { at, lost }) => Shown::From {
-            at: a.max(at),
-            lost: b || lost,
-        },
-        _ => Shown::Never,
+        (ShownBeginning::Wrong, _) | (_, ShownBeginning::Wrong) => ShownBeginning::Wrong,
+        (ShownBeginning::From { at: a, lost: b }, ShownBeginning::From { at, lost }) => {
+            ShownBeginning::From {
+                at: a.max(at),
+                lost: b || lost,
+            }
+        }
+        _ => ShownBeginning::Never,
     })
 }
 
@@ -295,7 +297,7 @@ impl Beginning {
         if front.iter().any(whole) { 0 } else { first }
     }
 
-    fn shown(&self) -> Shown {
+    fn shown(&self) -> ShownBeginning {
         let pairs = || self.came.windows(2).map(|two| [two[0], two[1]]);
         let counted = |[(at, sync), (end, address)]: &[(Instant, u8); 2]| {
             let asked = |place: usize| {
@@ -333,12 +335,14 @@ impl Beginning {
         let at = |byte: &(Instant, u8)| byte.0;
         let all = [address, sequence.map(at), synco.map(at)];
         match all.into_iter().flatten().min() {
-            Some(at) => Shown::From {
+            Some(at) => ShownBeginning::From {
                 at,
                 lost: self.is_lost(at),
             },
-            None if is_whole && !self.came.iter().all(|byte| self.may_come(*byte)) => Shown::Wrong,
-            None => Shown::Never,
+            None if is_whole && !self.came.iter().all(|byte| self.may_come(*byte)) => {
+                ShownBeginning::Wrong
+            }
+            None => ShownBeginning::Never,
         }
     }
 

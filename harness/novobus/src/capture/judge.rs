@@ -1,7 +1,7 @@
 //! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
 use super::begin::{
-    Shown, after_silences, from, gaps, is_midway, is_one_telegram, parts, shown, without,
+    ShownBeginning, after_silences, from, gaps, is_midway, is_one_telegram, parts, shown, without,
 };
 use super::diff::{ComparedRun, Summary, compare};
 use super::open::explanations;
@@ -25,7 +25,7 @@ use harness_sim::record::LineByte;
 
 /// The result of a judgement.
 #[derive(Clone, Debug)]
-pub(crate) struct Judged {
+pub(crate) struct CaptureVerdict {
     /// Passed where the last link of every ring carried what the model says; inconclusive where no last link was captured.
     pub verdict: Verdict,
     /// The last links: what the master received.
@@ -67,7 +67,7 @@ const NEVER_SILENT: &str = "the capture begins in mid-conversation, and its ring
 /// Why what differs across a gap accuses no drive.
 const OF_A_GAP: &str = "what differs shows in none of the parts between gaps: bytes that are not in the capture may have been sent in them";
 
-impl Judged {
+impl CaptureVerdict {
     /// What differs does not accuse a drive, for this reason.
     fn in_doubt(mut self, why: &str) -> Self {
         self.verdict = Verdict::Inconclusive;
@@ -113,7 +113,10 @@ fn first(problems: &Problems) -> String {
 ///
 /// # Errors
 /// [`JudgeError`].
-pub(crate) fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
+pub(crate) fn judge(
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
+) -> Result<CaptureVerdict, JudgeError> {
     let judged = judge_part(capture, options);
     let differs = judged
         .as_ref()
@@ -136,7 +139,7 @@ pub(crate) fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Jud
     Ok(judged)
 }
 
-fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
+fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<CaptureVerdict, JudgeError> {
     let judged = judge_whole(capture, options)?;
     if judged.verdict != Verdict::Failed {
         return Ok(judged);
@@ -147,9 +150,9 @@ fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, J
     let first = judged.master.first.as_ref();
     let first = first.and_then(|first| first.sides[0]).map(|byte| byte.at);
     let is_early = match shown {
-        Shown::From { at, lost } => lost || first.is_some_and(|first| first < at),
-        Shown::Never => true,
-        Shown::Wrong => false,
+        ShownBeginning::From { at, lost } => lost || first.is_some_and(|first| first < at),
+        ShownBeginning::Never => true,
+        ShownBeginning::Wrong => false,
     };
     if !is_midway && !is_early {
         return match may_test_itself(capture, options, &judged)? {
@@ -185,9 +188,9 @@ fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, J
         return Ok(judged);
     }
     let normal = match shown {
-        Shown::From { at, .. } => starts.partition_point(|start| *start < at),
-        Shown::Never => starts.len(),
-        Shown::Wrong => 0,
+        ShownBeginning::From { at, .. } => starts.partition_point(|start| *start < at),
+        ShownBeginning::Never => starts.len(),
+        ShownBeginning::Wrong => 0,
     };
     if normal == starts.len() {
         return Ok(judged.in_doubt(BEFORE));
@@ -208,7 +211,7 @@ fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, J
 fn may_test_itself(
     capture: &Capture,
     options: &JudgeOptions<'_>,
-    judged: &Judged,
+    judged: &CaptureVerdict,
 ) -> Result<bool, JudgeError> {
     let Some(first) = judged.links.first.as_ref().map(|first| first.at) else {
         return Ok(false);
@@ -227,7 +230,10 @@ fn may_test_itself(
 
 /// Judges a capture as one that begins with nothing under way. Without gaps up to the tolerance the model can be apart from a drive that
 /// does something in its own time (ND21 9.9, 10.5, 14.10.5), so that a capture that differs is played once more at its own times.
-fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
+fn judge_whole(
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
+) -> Result<CaptureVerdict, JudgeError> {
     let told = unforeseen(capture);
     let none = Header::default();
     let judged = judge_as(capture, options, &told, (&none, options.tolerance()))?;
@@ -270,7 +276,7 @@ fn judge_as(
     options: &JudgeOptions<'_>,
     told: &[CapturedFacts],
     more: (&Header, Span),
-) -> Result<Judged, JudgeError> {
+) -> Result<CaptureVerdict, JudgeError> {
     let (model, remarks) = model(capture, options, more)?;
     let model = as_captured(&model, capture);
     let behind = |ring: usize, link: &Channel, index: usize| {
@@ -318,7 +324,7 @@ fn judge_as(
     };
     let is_plain = verdict == Verdict::Failed && options.setup.is_none();
     let in_doubt = is_plain && compare(left, right, tolerance, &of_drives, Some(end)).differ == 0;
-    let judged = Judged {
+    let judged = CaptureVerdict {
         verdict,
         master,
         links,

@@ -1,7 +1,7 @@
 //! Captures of adapters that give bytes in portions, late, and that end in the middle of a conversation.
 
 use super::tests::run;
-use crate::capture::judge::{Judged, judge};
+use crate::capture::judge::{CaptureVerdict, judge};
 use harness_bench::capture::{Capture, CaptureSpan, JudgeOptions};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::{Instant, Span};
@@ -38,7 +38,7 @@ fn given(capture: &Capture, moments: [u64; 2], until: u64) -> Capture {
     given
 }
 
-fn judged(capture: &Capture) -> Judged {
+fn judged(capture: &Capture) -> CaptureVerdict {
     let options = JudgeOptions {
         title: "test",
         setup: None,

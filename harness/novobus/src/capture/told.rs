@@ -1,6 +1,6 @@
 //! What came of judging a capture, in the words of the command line.
 
-use super::judge::{Judged, judge};
+use super::judge::{CaptureVerdict, judge};
 use super::scenario::scenario;
 use harness_bench::capture::{Capture, JudgeOptions, JudgedCapture};
 use harness_bench::counted::counted;
@@ -70,7 +70,7 @@ fn damaged(capture: &Capture) -> Vec<String> {
     all
 }
 
-fn notes(judged: &Judged) -> Vec<String> {
+fn notes(judged: &CaptureVerdict) -> Vec<String> {
     let mut all = Vec::new();
     if judged.adopted > 0 {
         all.push(format!(
@@ -95,7 +95,7 @@ fn notes(judged: &Judged) -> Vec<String> {
 }
 
 /// The bytes around what differs.
-fn shown(judged: &Judged) -> String {
+fn shown(judged: &CaptureVerdict) -> String {
     let right = match judged.verdict {
         Verdict::Passed if judged.links.differ == 0 => return String::new(),
         Verdict::Passed => {

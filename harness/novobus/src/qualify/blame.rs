@@ -4,9 +4,9 @@
 //! drive's, unless another drive damages the bytes that it passes on: then bytes differ in telegrams to any drive. To tell these cases
 //! apart, the attempt is played again with the drives' roles exchanged.
 
-use super::diagnose::{Named, Whose, proven};
+use super::diagnose::{AccusedDrives, NamedDeviation, proven};
 use super::exchange::{AttemptBytes, begin};
-use super::pinned::Pinned;
+use super::pinned::PinnedDrive;
 use crate::calm::calm;
 use crate::language::read::RingScenario;
 use crate::twin::{Comparison, Conversation, Divergence, Symptom};
@@ -249,7 +249,7 @@ pub(crate) fn culprit(
     drives: u8,
     seen: &[Meant],
     trials: &[Trial],
-    pinned: &[Pinned],
+    pinned: &[PinnedDrive],
 ) -> Option<Culprit> {
     let mut shown = pinned.iter().filter(|pinned| pinned.names_the_drive);
     if let Some(first) = shown.next() {
@@ -304,18 +304,20 @@ pub(crate) fn culprit(
 /// The drive to blame, and the deviations that agree with it. Where none agrees with the drive, no drive is proven: all deviations are
 /// returned, and each may be one of any drive that one of them accuses.
 #[must_use]
-pub(crate) fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
+pub(crate) fn agreed(
+    culprit: Option<Culprit>,
+    named: &[NamedDeviation],
+) -> (Option<Culprit>, Vec<NamedDeviation>) {
     let Some(blamed) = culprit else {
         return (None, proven(named.to_vec()));
     };
-    let may_be =
-        |named: &&Named| matches!(&named.whose, Whose::OneOf(all) if all.contains(&blamed.drive));
+    let may_be = |named: &&NamedDeviation| matches!(&named.whose, AccusedDrives::OneOf(all) if all.contains(&blamed.drive));
     let agreed: Vec<_> = named.iter().filter(may_be).cloned().collect();
     if agreed.is_empty() && !named.is_empty() {
         return (None, proven(named.to_vec()));
     }
-    let of_it = agreed.into_iter().map(|named| Named {
-        whose: Whose::OneOf(vec![blamed.drive]),
+    let of_it = agreed.into_iter().map(|named| NamedDeviation {
+        whose: AccusedDrives::OneOf(vec![blamed.drive]),
         ..named
     });
     (culprit, of_it.collect())

@@ -2,7 +2,7 @@
 
 use super::hypothesis::{Fit, fit, judge};
 use crate::language::syntax::{DriveRange, Header, Setup};
-use crate::rig::Driven;
+use crate::rig::DriverAttempt;
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_sim::novobus::deviation::{
     DEVIATIONS, Deviation, MASTER_DEVIATIONS, MasterDeviation, RELATIVES,
@@ -24,24 +24,24 @@ const MOST_AGAINST: u64 = 2;
 
 /// A deviation that explains every byte.
 #[derive(Clone, Debug)]
-pub(crate) struct Named {
+pub(crate) struct NamedDeviation {
     pub deviation: &'static Deviation,
     /// Which drives have it.
-    pub whose: Whose,
+    pub whose: AccusedDrives,
     /// Whether every byte would be the same if all drives had it: then that drive has it, and perhaps others.
     pub perhaps_of_all: bool,
 }
 
 /// Which drives have a deviation, as far as the bytes tell.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Whose {
+pub(crate) enum AccusedDrives {
     /// One of these; more than one where the bytes do not tell which.
     OneOf(Vec<u8>),
     /// All of them: one alone does not explain the bytes.
     Every,
 }
 
-impl fmt::Display for Named {
+impl fmt::Display for NamedDeviation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Deviation {
             name,
@@ -55,8 +55,8 @@ impl fmt::Display for Named {
         };
         let what = format!("{name} (ND21 {section}): {about}{more}");
         match &self.whose {
-            Whose::Every => write!(f, "every drive: {what}"),
-            Whose::OneOf(drives) => match drives.as_slice() {
+            AccusedDrives::Every => write!(f, "every drive: {what}"),
+            AccusedDrives::OneOf(drives) => match drives.as_slice() {
                 [drive] => write!(f, "drive {drive}: {what}"),
                 drives => {
                     let drives: Vec<_> = drives.iter().map(u8::to_string).collect();
@@ -114,42 +114,46 @@ impl Candidate {
 pub(crate) fn name<E>(
     seen: &RingSeen<'_>,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Vec<Named> {
+) -> Vec<NamedDeviation> {
     let mut named = name_among(seen, candidates(seen, DEVIATIONS.all()), twin);
     if !named.is_empty() && seen.exactness.knows_cells {
         return named;
     }
     let mut relatives = name_among(seen, candidates(seen, RELATIVES.all()), twin);
-    let of_all = |named: &[Named]| named.iter().any(|named| named.whose == Whose::Every);
+    let of_all = |named: &[NamedDeviation]| {
+        named
+            .iter()
+            .any(|named| named.whose == AccusedDrives::Every)
+    };
     if named.is_empty() || of_all(&named) && !of_all(&relatives) && !relatives.is_empty() {
         return relatives;
     }
     let accused = drives(&named);
     relatives.retain(|relative| match &relative.whose {
-        Whose::Every => false,
-        Whose::OneOf(some) => some.iter().any(|drive| !accused.contains(drive)),
+        AccusedDrives::Every => false,
+        AccusedDrives::OneOf(some) => some.iter().any(|drive| !accused.contains(drive)),
     });
     named.extend(relatives.into_iter().filter(|_| !accused.is_empty()));
     named
 }
 
 /// The drives that some of these accuse.
-fn drives(named: &[Named]) -> BTreeSet<u8> {
+fn drives(named: &[NamedDeviation]) -> BTreeSet<u8> {
     let whose = named.iter().map(|deviation| &deviation.whose);
     let some = whose.filter_map(|whose| match whose {
-        Whose::OneOf(some) => Some(some),
-        Whose::Every => None,
+        AccusedDrives::OneOf(some) => Some(some),
+        AccusedDrives::Every => None,
     });
     some.flatten().copied().collect()
 }
 
 /// What is proven by deviations that each explain everything: a drive only if all of them accuse it alone. Where they do not, each may be
 /// a deviation of any drive that one of them accuses.
-pub(super) fn proven(mut named: Vec<Named>) -> Vec<Named> {
+pub(super) fn proven(mut named: Vec<NamedDeviation>) -> Vec<NamedDeviation> {
     let all: Vec<u8> = drives(&named).into_iter().collect();
     for deviation in &mut named {
-        if deviation.whose != Whose::Every {
-            deviation.whose = Whose::OneOf(all.clone());
+        if deviation.whose != AccusedDrives::Every {
+            deviation.whose = AccusedDrives::OneOf(all.clone());
         }
     }
     named
@@ -159,7 +163,7 @@ fn name_among<E>(
     seen: &RingSeen<'_>,
     mut candidates: Vec<Candidate>,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Vec<Named> {
+) -> Vec<NamedDeviation> {
     let explains = |header: &Header, attempt: &[Conversation]| -> Option<Fit> {
         judge(twin(header).ok()?, attempt, seen.exactness)
     };
@@ -238,7 +242,7 @@ fn candidates(
 }
 
 /// Those that explain the times too if any does, and of these those of single drives if there are some; one entry for each deviation.
-fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
+fn simplest(mut candidates: Vec<Candidate>) -> Vec<NamedDeviation> {
     if candidates.iter().any(|candidate| candidate.timely) {
         candidates.retain(|candidate| candidate.timely);
     }
@@ -252,12 +256,12 @@ fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
     let named = of_one.map(|alike| {
         let drives = alike.iter().filter_map(|candidate| candidate.drive);
         let drives: Vec<u8> = drives.collect();
-        Named {
+        NamedDeviation {
             deviation: alike[0].deviation,
             perhaps_of_all: !drives.is_empty() && of_all.contains(alike[0].deviation.name),
             whose: match drives.is_empty() {
-                true => Whose::Every,
-                false => Whose::OneOf(drives),
+                true => AccusedDrives::Every,
+                false => AccusedDrives::OneOf(drives),
             },
         }
     });
@@ -266,7 +270,7 @@ fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
 
 /// The deviations of the master under which everything is as it was recorded, in every attempt in which the driver had a part.
 #[must_use]
-pub(crate) fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDeviation> {
+pub(crate) fn deviating_masters(attempts: &[DriverAttempt]) -> Vec<&'static MasterDeviation> {
     let explains = |deviation: &&'static MasterDeviation| {
         let mut all = attempts.iter();
         all.all(|driven| driven.is_explained_by(Some(deviation)))
@@ -279,10 +283,10 @@ mod tests {
     use super::*;
     use harness_sim::novobus::deviation::deviation;
 
-    fn named(name: &str, drives: &[u8]) -> Named {
-        Named {
+    fn named(name: &str, drives: &[u8]) -> NamedDeviation {
+        NamedDeviation {
             deviation: deviation(name).expect("a deviation"),
-            whose: Whose::OneOf(drives.to_vec()),
+            whose: AccusedDrives::OneOf(drives.to_vec()),
             perhaps_of_all: false,
         }
     }
@@ -290,9 +294,9 @@ mod tests {
     /// A drive is accused only where every explanation accuses it.
     #[test]
     fn a_drive_is_proven_only_if_all_explanations_agree() {
-        let text = |named: Vec<Named>| -> Vec<String> {
+        let text = |named: Vec<NamedDeviation>| -> Vec<String> {
             let proven = proven(named);
-            proven.iter().map(Named::to_string).collect()
+            proven.iter().map(NamedDeviation::to_string).collect()
         };
         let zeros = |drives: &[u8]| named("increments-zeros-only", drives);
         let none = |drives: &[u8]| named("adds-0-in-error-mode", drives);

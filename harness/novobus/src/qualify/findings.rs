@@ -1,9 +1,9 @@
 //! What a qualification compared with the model, and what differed.
 
 use super::blame::{Culprit, Meant, Sighting, Trial, agreed, culprit};
-use super::diagnose::{Named, RingSeen};
-use super::pinned::Pinned;
-use crate::rig::Driven;
+use super::diagnose::{NamedDeviation, RingSeen};
+use super::pinned::PinnedDrive;
+use crate::rig::DriverAttempt;
 use crate::rig::{OnRings, PlayedOnRings};
 use crate::twin::{Conversation, Exactness};
 use harness_bench::counted::counted;
@@ -37,7 +37,7 @@ pub(super) struct Findings {
     /// The outcomes of those that were tried with the drives' roles exchanged.
     trials: Vec<Trial>,
     /// What questions to the ring have shown.
-    pinned: Vec<Pinned>,
+    pinned: Vec<PinnedDrive>,
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
     /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
@@ -47,7 +47,7 @@ pub(super) struct Findings {
     /// The drives that the telegrams around a difference name.
     suspects: Vec<u8>,
     /// What the bench's own master did, and whether it was ever wrong.
-    pub(super) driven: Vec<Driven>,
+    pub(super) driven: Vec<DriverAttempt>,
     pub(super) master_is_wrong: bool,
     /// Scenarios and conversations that were played, and that were compared to their end and equal.
     played: usize,
@@ -225,7 +225,7 @@ impl Findings {
     }
 
     /// Notes what a question to the ring has shown.
-    pub(super) fn note_pinned(&mut self, pinned: Pinned) {
+    pub(super) fn note_pinned(&mut self, pinned: PinnedDrive) {
         self.pinned.push(pinned);
     }
 
@@ -291,7 +291,7 @@ impl Findings {
 
     /// The deviations that explain what differed, `None` where they were not looked for, and what was compared; `known` are those that the
     /// rig's file names.
-    pub(super) fn text(&self, named: Option<&[Named]>, known: &[String]) -> String {
+    pub(super) fn text(&self, named: Option<&[NamedDeviation]>, known: &[String]) -> String {
         let mut text = self.verdict(named, known);
         if self.is_open() {
             text.push_str("not compared, or not equal:\n");
@@ -311,7 +311,7 @@ impl Findings {
     }
 
     /// Which deviations there are, as far as is known.
-    fn verdict(&self, named: Option<&[Named]>, known: &[String]) -> String {
+    fn verdict(&self, named: Option<&[NamedDeviation]>, known: &[String]) -> String {
         let held_back = self.held_back.iter();
         let lines = held_back.map(|held| format!("deviation: {held}\n"));
         let mut text: String = lines.collect();

@@ -17,13 +17,13 @@ mod settle;
 #[cfg(test)]
 pub(crate) use blame::{Culprit, Meant, Sighting, agreed, culprit, exchange};
 #[cfg(test)]
-pub(crate) use diagnose::{Named, RingSeen, Whose, deviating_masters, name};
+pub(crate) use diagnose::{AccusedDrives, NamedDeviation, RingSeen, deviating_masters, name};
 #[cfg(test)]
 pub(crate) use eeprom::{dumps, marches};
 #[cfg(test)]
 pub(crate) use hypothesis::{Hypothesis, explaining};
 #[cfg(test)]
-pub(crate) use pinned::{Pinned, questions};
+pub(crate) use pinned::{PinnedDrive, questions};
 #[cfg(test)]
 pub(crate) use probes::{Probe, ProbeTarget, hypotheses};
 pub(crate) use probes::{conversations, probes, some_drives, thorough};

@@ -45,7 +45,7 @@ const TIME_OUT: u8 = 0x08;
 
 /// A drive that a question has shown to be wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Pinned {
+pub(crate) struct PinnedDrive {
     pub drive: u8,
     /// The section of the broken rule.
     pub section: &'static str,
@@ -55,7 +55,7 @@ pub(crate) struct Pinned {
     pub names_the_drive: bool,
 }
 
-impl fmt::Display for Pinned {
+impl fmt::Display for PinnedDrive {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.about)
     }
@@ -162,7 +162,7 @@ impl QuestionKind {
 impl Question<'_> {
     /// What the conversations of the played scenario show.
     #[must_use]
-    pub(crate) fn answer(&self, conversations: &[Conversation]) -> Option<Pinned> {
+    pub(crate) fn answer(&self, conversations: &[Conversation]) -> Option<PinnedDrive> {
         match self.kind {
             QuestionKind::Refusal => self.refused(conversations),
             QuestionKind::Nobody(byte) => taken_by(self.drives, byte, conversations),
@@ -174,7 +174,7 @@ impl Question<'_> {
     /// The drive that the ring has spelled out is wrong where it cannot have been right: only the master's bytes have reached the first
     /// drive of the ring; a drive that is not addressed does not look at the bytes of a telegram (9.3); and no byte makes a drive report a
     /// time-out (9.9). Any other drive may have been sent something else by a drive in front of it.
-    fn refused(&self, conversations: &[Conversation]) -> Option<Pinned> {
+    fn refused(&self, conversations: &[Conversation]) -> Option<PinnedDrive> {
         let pairs = pairs(conversations.last()?)?;
         let is_synco = |window: &[(u8, u8)]| window.iter().all(|(sent, _)| *sent == SYNCO);
         let asked = pairs.windows(SPELLED_WITHIN).rposition(is_synco)? + SPELLED_WITHIN;
@@ -194,7 +194,7 @@ impl Question<'_> {
         let code = code.map_or(String::new(), |code| {
             format!(" and reports the error {OF_THE_BUS:02X}{code:02X}")
         });
-        Some(Pinned {
+        Some(PinnedDrive {
             drive,
             section,
             about: format!(
@@ -326,7 +326,7 @@ fn taken(drives: u8, byte: u8) -> Option<String> {
 }
 
 /// The drive whose mark came, if the address byte came back as that of no drive: then each drive has added 1 to it (9.3).
-fn taken_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinned> {
+fn taken_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<PinnedDrive> {
     let pairs = pairs(conversations.last()?)?;
     let asked = read_behind(byte);
     let answer = pairs
@@ -336,7 +336,7 @@ fn taken_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinn
         return None;
     };
     let drive = data.checked_sub(1).filter(|drive| *drive < drives)?;
-    (*address == byte.wrapping_add(drives)).then(|| Pinned {
+    (*address == byte.wrapping_add(drives)).then(|| PinnedDrive {
         drive,
         section: "9.3",
         about: format!(
@@ -370,7 +370,7 @@ fn kept(drives: u8, byte: u8) -> Option<String> {
 /// Drives that answer at another step than the sum that they must have kept says. Where the address byte comes back wrong, the one of them
 /// that is the nearest to the master has added wrong: a drive keeps the sum that it sends (9.3), and those behind it add to that. Where the
 /// address byte is right, a single drive takes short addresses wrong.
-fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinned> {
+fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<PinnedDrive> {
     let pairs = pairs(conversations.last()?)?;
     // Each drive has taken its own mark, so that the marks tell the answers apart.
     let marked = |drive: u8| {
@@ -420,7 +420,7 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
         (true, [drive]) if known => (*drive, "9.2"),
         _ => return None,
     };
-    Some(Pinned {
+    Some(PinnedDrive {
         drive,
         section,
         about: format!(
@@ -470,7 +470,7 @@ fn accesses() -> Vec<(u16, Option<u8>)> {
 
 /// Cells that are wrong in both passes, and the same ones. If all are right, and a word was wrong that was written byte by byte, then the
 /// command that reads words is.
-fn cells(sighting: &Sighting, drive: u8, conversations: &[Conversation]) -> Option<Pinned> {
+fn cells(sighting: &Sighting, drive: u8, conversations: &[Conversation]) -> Option<PinnedDrive> {
     let accesses = accesses();
     let length = |byte: &Option<u8>| if byte.is_some() { 7 } else { 6 };
     let all: usize = accesses.iter().map(|(_, byte)| length(byte)).sum();
@@ -494,7 +494,7 @@ fn cells(sighting: &Sighting, drive: u8, conversations: &[Conversation]) -> Opti
     }
     let [first, second] = wrong;
     if first.is_empty() && second.is_empty() && sighting.word_of_bytes {
-        return Some(Pinned {
+        return Some(PinnedDrive {
             drive,
             section: "10.1",
             about: format!(
@@ -506,7 +506,7 @@ fn cells(sighting: &Sighting, drive: u8, conversations: &[Conversation]) -> Opti
     }
     let few = !first.is_empty() && first.len() <= MOST_CELLS;
     let named: Vec<String> = first.iter().map(|cell| format!("{cell:04X}")).collect();
-    (few && first == second).then(|| Pinned {
+    (few && first == second).then(|| PinnedDrive {
         drive,
         section: "14.2.1",
         about: format!(

@@ -130,7 +130,7 @@ fn of_the_drive<E>(
 ) -> Result<ProbeAnswer, E> {
     let header = |what: SetupKind| Header::from(Setup::new(DriveRange::one(0, drive), what));
     let known = PROPERTIES.iter().find(|known| known.name == property);
-    let explained = |what: SetupKind| -> Result<Explained, E> {
+    let explained = |what: SetupKind| -> Result<ExplainedPart, E> {
         Ok(explained(twin(&header(what))?, conversations, exactness))
     };
     if let Some(longest) = known.and_then(|property| property.longest()) {
@@ -148,7 +148,7 @@ fn of_the_drive<E>(
     let mut explaining = Vec::new();
     for word in known.into_iter().flat_map(|property| property.words()) {
         let what = SetupKind::word(property, word);
-        if explained(what.clone())? == Explained::Whole {
+        if explained(what.clone())? == ExplainedPart::Whole {
             explaining.push(what);
         }
     }
@@ -250,7 +250,7 @@ fn written(tenths: u64) -> Duration {
 
 /// How well a model explains the bytes received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Explained {
+enum ExplainedPart {
     Whole,
     /// The bits in the cell by which the drive reports that it is done differ; these are the model's.
     Cell(u8),
@@ -258,13 +258,17 @@ enum Explained {
     Not,
 }
 
-fn explained(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Explained {
+fn explained(
+    mut twin: Twin,
+    conversations: &[Conversation],
+    exactness: Exactness,
+) -> ExplainedPart {
     let comparisons = twin.follow_while_alike(conversations, exactness, Silences::Noted);
     let Some(found) = comparisons.into_iter().find_map(|c| c.divergence) else {
-        return Explained::Whole;
+        return ExplainedPart::Whole;
     };
     let (Some((asked, looks)), Some((_, wanted))) = (exactness.looks, found.expected) else {
-        return Explained::Not;
+        return ExplainedPart::Not;
     };
     let look = match found.role {
         Role::Data {
@@ -273,8 +277,8 @@ fn explained(mut twin: Twin, conversations: &[Conversation], exactness: Exactnes
         } if drive == asked => looks.iter().find(|look| look.address == address),
         _ => None,
     };
-    look.map_or(Explained::Not, |look| {
-        Explained::Cell(wanted.byte & look.mask)
+    look.map_or(ExplainedPart::Not, |look| {
+        ExplainedPart::Cell(wanted.byte & look.mask)
     })
 }
 
@@ -289,9 +293,12 @@ enum Bracket {
 
 /// Finds the times up to `longest` that explain everything, if a drive is polled until it is done. If the model answers as with the
 /// longest time, its time is too long, else too short.
-fn bracket<E>(longest: u64, explained: &dyn Fn(u64) -> Result<Explained, E>) -> Result<Bracket, E> {
+fn bracket<E>(
+    longest: u64,
+    explained: &dyn Fn(u64) -> Result<ExplainedPart, E>,
+) -> Result<Bracket, E> {
     let not_yet = explained(longest)?;
-    if not_yet == Explained::Whole && explained(0)? == Explained::Whole {
+    if not_yet == ExplainedPart::Whole && explained(0)? == ExplainedPart::Whole {
         return Ok(Bracket::Anything);
     }
     // The shortest time that is not too short.
@@ -299,19 +306,19 @@ fn bracket<E>(longest: u64, explained: &dyn Fn(u64) -> Result<Explained, E>) -> 
     while low < high {
         let middle = low.midpoint(high);
         let here = explained(middle)?;
-        match here == Explained::Whole || here == not_yet {
+        match here == ExplainedPart::Whole || here == not_yet {
             true => high = middle,
             false => low = middle + 1,
         }
     }
     let shortest = low;
-    if explained(shortest)? != Explained::Whole {
+    if explained(shortest)? != ExplainedPart::Whole {
         return Ok(Bracket::Nothing);
     }
     let mut high = longest;
     while low < high {
         let middle = low.midpoint(high + 1);
-        match explained(middle)? == Explained::Whole {
+        match explained(middle)? == ExplainedPart::Whole {
             true => low = middle,
             false => high = middle - 1,
         }
@@ -325,10 +332,12 @@ mod tests {
 
     /// A drive that needs `time`, asked at these times whether it is done.
     fn asked(time: u64, questions: &[u64]) -> Bracket {
-        let explained = |model: u64| -> Result<Explained, ()> {
+        let explained = |model: u64| -> Result<ExplainedPart, ()> {
             let done = questions.iter().map(|at| (*at >= time, *at >= model));
             let wrong = done.into_iter().find(|(real, model)| real != model);
-            Ok(wrong.map_or(Explained::Whole, |(_, model)| Explained::Cell(model.into())))
+            Ok(wrong.map_or(ExplainedPart::Whole, |(_, model)| {
+                ExplainedPart::Cell(model.into())
+            }))
         };
         bracket(1_000, &explained).expect("a bracket")
     }
@@ -344,7 +353,7 @@ mod tests {
         // Asked late in the first place, and then from the beginning.
         assert_eq!(asked(120, &[300, 50, 100, 150]), Bracket::Between(101, 150));
         // What the question is not about.
-        let other = bracket(1_000, &|_| Ok::<_, ()>(Explained::Not));
+        let other = bracket(1_000, &|_| Ok::<_, ()>(ExplainedPart::Not));
         assert_eq!(other, Ok(Bracket::Nothing));
     }
 

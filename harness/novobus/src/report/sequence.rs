@@ -43,14 +43,14 @@ const TOP: usize = 30;
 
 /// A sender or receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Who {
+enum Party {
     Master,
     Drive(u8),
     /// All drives, or an unknown one.
     Ring,
 }
 
-impl Who {
+impl Party {
     fn name(self) -> String {
         match self {
             Self::Master => "master".to_owned(),
@@ -84,8 +84,8 @@ impl EventKind {
 struct Event {
     at: Instant,
     kind: EventKind,
-    from: Who,
-    to: Who,
+    from: Party,
+    to: Party,
     what: String,
     bytes: Vec<Option<u8>>,
     result: String,
@@ -129,7 +129,7 @@ fn said(link: &Channel, mut reader: LinkReader<'_>, events: &mut Vec<Event>) {
         } else {
             (seen.meaning, byte.received)
         };
-        let whom = meaning.drive.map_or(Who::Ring, Who::Drive);
+        let whom = meaning.drive.map_or(Party::Ring, Party::Drive);
         let begun = match meaning.role {
             ByteRole::Command
             | ByteRole::Parameter
@@ -182,16 +182,16 @@ fn said(link: &Channel, mut reader: LinkReader<'_>, events: &mut Vec<Event>) {
 }
 
 /// A command or an answer that begins.
-fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
+fn told(at: Instant, master: bool, whom: Party, process_data: bool) -> Event {
     let what = if process_data {
         "process data"
     } else {
         "a command"
     };
     let (kind, from, to) = if master {
-        (EventKind::Job, Who::Master, whom)
+        (EventKind::Job, Party::Master, whom)
     } else {
-        (EventKind::Answer, whom, Who::Master)
+        (EventKind::Answer, whom, Party::Master)
     };
     Event {
         at,
@@ -217,9 +217,9 @@ fn open_run(role: ByteRole, master: bool, at: Instant, events: &mut Vec<Event>) 
         _ => return None,
     };
     let (from, to) = if master {
-        (Who::Master, Who::Ring)
+        (Party::Master, Party::Ring)
     } else {
-        (Who::Ring, Who::Master)
+        (Party::Ring, Party::Master)
     };
     let index = events.len().checked_sub(1);
     if let Some(index) =
@@ -243,21 +243,21 @@ fn open_run(role: ByteRole, master: bool, at: Instant, events: &mut Vec<Event>) 
 /// Which jobs were answered: the n-th of a drive by its n-th answer. A check sequence makes every drive forget what it has
 /// begun (ND21 9.8), so jobs in front of one are answered in front of it or not at all.
 fn asked(events: &mut [Event]) {
-    let sequence = |event: &&Event| event.from == Who::Master && event.what == CHECK;
+    let sequence = |event: &&Event| event.from == Party::Master && event.what == CHECK;
     let sequences: Vec<_> = events
         .iter()
         .filter(sequence)
         .map(|event| event.at)
         .collect();
     let period = |at: Instant| sequences.iter().filter(|sequence| **sequence < at).count();
-    let mut answers: BTreeMap<(Who, usize), Vec<usize>> = BTreeMap::new();
+    let mut answers: BTreeMap<(Party, usize), Vec<usize>> = BTreeMap::new();
     for (index, event) in events.iter().enumerate() {
         if event.kind == EventKind::Answer {
             let key = (event.from, period(event.at));
             answers.entry(key).or_default().push(index);
         }
     }
-    let mut next: BTreeMap<(Who, usize), usize> = BTreeMap::new();
+    let mut next: BTreeMap<(Party, usize), usize> = BTreeMap::new();
     for index in 0..events.len() {
         let job = &events[index];
         if job.kind != EventKind::Job {
@@ -298,7 +298,7 @@ fn faults(trace: &Trace, events: &mut Vec<Event>) {
         })
         .collect();
     all.sort_by_key(|(_, byte)| byte.at);
-    let end = |end: Option<u8>| end.map_or(Who::Master, Who::Drive);
+    let end = |end: Option<u8>| end.map_or(Party::Master, Party::Drive);
     let more = all.len().saturating_sub(FAULTS);
     for (number, (link, byte)) in all.into_iter().take(FAULTS).enumerate() {
         let hex = |byte: Option<u8>| byte.map_or("nothing".to_owned(), |b| format!("{b:02X}"));
@@ -332,8 +332,8 @@ fn remarks(trace: &Trace, events: &mut Vec<Event>) {
     let note = |at, drive, what: String, kind| Event {
         at,
         kind,
-        from: Who::Drive(drive),
-        to: Who::Drive(drive),
+        from: Party::Drive(drive),
+        to: Party::Drive(drive),
         what,
         bytes: Vec::new(),
         result: String::new(),
@@ -369,23 +369,23 @@ fn hex(event: &Event) -> String {
 }
 
 /// The participants with a lifeline: the master, the drives in the order of the ring, and one that stands for all others.
-fn lifelines(drawn: &[Event]) -> Vec<Who> {
-    let mut who: Vec<Who> = drawn
+fn lifelines(drawn: &[Event]) -> Vec<Party> {
+    let mut who: Vec<Party> = drawn
         .iter()
         .flat_map(|event| [event.from, event.to])
         .collect();
     who.sort_unstable_by_key(|who| match who {
-        Who::Master => (0, 0),
+        Party::Master => (0, 0),
         // As in a ring: the highest number stands next to the master.
-        Who::Drive(drive) => (1, 255 - drive),
-        Who::Ring => (2, 0),
+        Party::Drive(drive) => (1, 255 - drive),
+        Party::Ring => (2, 0),
     });
     who.dedup();
     let many = who.len() > LIFELINES;
     who.truncate(LIFELINES);
-    if many || !who.contains(&Who::Ring) {
-        who.retain(|one| *one != Who::Ring);
-        who.push(Who::Ring);
+    if many || !who.contains(&Party::Ring) {
+        who.retain(|one| *one != Party::Ring);
+        who.push(Party::Ring);
     }
     who
 }
@@ -394,7 +394,7 @@ fn lifelines(drawn: &[Event]) -> Vec<Who> {
 fn picture(html: &mut Html, id: &str, events: &[Event]) {
     let drawn = &events[..events.len().min(DRAWN)];
     let who = lifelines(drawn);
-    let x = |one: Who| {
+    let x = |one: Party| {
         let place = who
             .iter()
             .position(|other| *other == one)

@@ -1,6 +1,6 @@
 //! What an attempt on rings has beside its outcome: how it compares with the twin, and what that says of the drives.
 
-use super::driven::Driven;
+use super::driven::DriverAttempt;
 use super::explanation::Explanation;
 use super::judge::{AttemptFacts, judge, known};
 use super::run::{opening, twin};
@@ -21,7 +21,7 @@ pub(crate) struct BesideTwin {
     /// How they compare with the twin's.
     pub comparisons: Vec<Comparison>,
     /// What the bench's own master did in it on a simulated rig, if it had a part.
-    pub driven: Option<Driven>,
+    pub driven: Option<DriverAttempt>,
     /// The choices of the manual with which it was compared, where the model's defaults do not explain what came before the scenario.
     pub assumed: Header,
 }
@@ -69,7 +69,7 @@ pub(super) fn judged(
         *beside = fresh;
     }
     let recorded = (exactness.tolerance, capabilities);
-    let driven = Driven::new(facts.plan, events, way, recorded, &outcome);
+    let driven = DriverAttempt::new(facts.plan, events, way, recorded, &outcome);
     // In real time a record does not hold every moment at which the master was asked.
     let driven = driven.filter(|_| rig.is_simulated());
     let driver = driven.as_ref();

@@ -18,7 +18,7 @@ const WRONG: &str =
 
 /// What the driver did in an attempt.
 #[derive(Clone, Debug)]
-pub(crate) struct Driven {
+pub(crate) struct DriverAttempt {
     plan: Plan,
     events: Vec<LinkEvent>,
     way: Way,
@@ -29,7 +29,7 @@ pub(crate) struct Driven {
     finding: Option<String>,
 }
 
-impl Driven {
+impl DriverAttempt {
     /// An attempt at a plan, as it was recorded; `None` where the driver had no part in it.
     pub(crate) fn new(
         plan: &Plan,

@@ -29,7 +29,7 @@ pub(crate) mod wrong_parity;
 pub(crate) use beside::OnRings;
 pub(crate) use beside::PlayedOnRings;
 pub(crate) use condition::condition;
-pub(crate) use driven::Driven;
+pub(crate) use driven::DriverAttempt;
 pub(crate) use health::examine;
 pub(crate) use permitted::limits;
 pub(crate) use ring_judge::RingJudge;

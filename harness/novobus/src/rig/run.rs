@@ -374,7 +374,7 @@ impl<'s> Run<'s> {
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
-        let mut beating = Beating(self.beats.clone());
+        let mut beating = LifeSign(self.beats.clone());
         play(&mut Recording::new(&mut guarded, &mut beating));
         Some(guarded)
     }
@@ -574,9 +574,9 @@ fn beat(beats: Option<&AtomicU64>) {
 }
 
 /// Tells a session's watchdog that the program works while it plays on a model, which takes a busy computer longer than the watchdog waits.
-struct Beating(Option<Arc<AtomicU64>>);
+struct LifeSign(Option<Arc<AtomicU64>>);
 
-impl Sink for Beating {
+impl Sink for LifeSign {
     fn take(&mut self, _: &LinkEvent) {
         beat(self.0.as_deref());
     }

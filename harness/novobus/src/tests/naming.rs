@@ -10,8 +10,9 @@ use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::link::SimulatedLink;
 use crate::qualify::{
-    Culprit, Meant, Named, Pinned, ProbeAnswer, RingSeen, Sighting, Whose, agreed, answer,
-    conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
+    AccusedDrives, Culprit, Meant, NamedDeviation, PinnedDrive, ProbeAnswer, RingSeen, Sighting,
+    agreed, answer, conversations, culprit, dumps, exchange, hypotheses, marches, name, probes,
+    questions,
 };
 use crate::rig::{Way, play_one};
 use crate::simulate::bench;
@@ -138,11 +139,11 @@ fn played_in_time(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
 struct NamingVerdict {
     /// Whether it differed from the model at all.
     differs: bool,
-    named: Vec<Named>,
+    named: Vec<NamedDeviation>,
     /// The drive that is to blame, whatever it does.
     culprit: Option<Culprit>,
     /// What the ring has shown when it was asked.
-    pinned: Vec<Pinned>,
+    pinned: Vec<PinnedDrive>,
 }
 
 /// What a ring was seen to do.
@@ -252,7 +253,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
         );
     }
     let accused = named.iter().filter_map(|named| match named.whose.clone() {
-        Whose::OneOf(drives) if drives.len() == 1 => Some(drives[0]),
+        AccusedDrives::OneOf(drives) if drives.len() == 1 => Some(drives[0]),
         _ => None,
     });
     let accused: Vec<_> = accused.collect();
@@ -260,17 +261,17 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
         accused.iter().all(|drive| Some(*drive) == whose),
         "{lines:?}: {named:?}"
     );
-    let is_it = |named: &&Named| {
+    let is_it = |named: &&NamedDeviation| {
         let drive = match (&named.whose, whose) {
-            (Whose::OneOf(drives), Some(drive)) => drives.contains(&drive),
-            (Whose::Every, None) => true,
+            (AccusedDrives::OneOf(drives), Some(drive)) => drives.contains(&drive),
+            (AccusedDrives::Every, None) => true,
             _ => false,
         };
         named.deviation.name == planted.name && drive
     };
     let right = named.iter().find(is_it);
     let end = match (right, named.len()) {
-        (Some(right), 1) if matches!(&right.whose, Whose::OneOf(drives) if drives.len() > 1) => {
+        (Some(right), 1) if matches!(&right.whose, AccusedDrives::OneOf(drives) if drives.len() > 1) => {
             End::AmongOthers
         }
         (Some(_), 1) => End::Alone,
@@ -500,7 +501,7 @@ fn a_follower_that_adds_nothing_is_told_from_the_drive_behind_it() {
         panic!("{verdict:?}")
     };
     assert_eq!(only.deviation.name, "adds-0-in-error-mode");
-    assert_eq!(only.whose, Whose::OneOf(vec![1]));
+    assert_eq!(only.whose, AccusedDrives::OneOf(vec![1]));
 }
 
 /// Relatives of the deviations with other numbers, some of them.
@@ -542,13 +543,12 @@ fn all_planted_in_every_drive() {
 
 /// In every drive: it is named for all of them, or for none.
 fn planted_in_every_drive(step: usize) {
-    let of_the_bus = DEVIATIONS
-        .all()
-        .filter(|deviation| !deviation.is_behind_the_bus());
+    let all = DEVIATIONS.all();
+    let of_the_bus = all.filter(|deviation| !deviation.is_behind_the_bus());
     for planted in of_the_bus.step_by(step) {
         let lines = [format!("drive 0..last deviates {}", planted.name)];
         let found = verdict(&lines);
-        let of_all = |named: &Named| named.whose == Whose::Every || named.perhaps_of_all;
+        let of_all = |one: &NamedDeviation| one.whose == AccusedDrives::Every || one.perhaps_of_all;
         assert!(
             found.named.is_empty() || found.named.iter().any(of_all),
             "{lines:?}: {found:?}"

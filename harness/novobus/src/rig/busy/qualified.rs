@@ -16,14 +16,14 @@ use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::verdict::Verdict;
 
 /// A rig whose outcomes are kept.
-struct Watched<'r, 's> {
+struct WatchedRig<'r, 's> {
     run: &'r mut Run<'s>,
     failed: Vec<String>,
     /// Those of the other parts.
     others: Vec<Self>,
 }
 
-impl<'r, 's> Watched<'r, 's> {
+impl<'r, 's> WatchedRig<'r, 's> {
     const fn new(run: &'r mut Run<'s>) -> Self {
         Self {
             run,
@@ -33,7 +33,7 @@ impl<'r, 's> Watched<'r, 's> {
     }
 }
 
-impl QualifiedBench for Watched<'_, '_> {
+impl QualifiedBench for WatchedRig<'_, '_> {
     type Stop = String;
 
     fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, String> {
@@ -80,7 +80,7 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
     let mut run = Run::new(&mut session).expect("a run");
     run.repeat();
     let facts = QualificationFacts::of(&mut run);
-    let mut watched = Watched::new(&mut run);
+    let mut watched = WatchedRig::new(&mut run);
     let mut said = match Qualification::new(facts).settle(&mut watched, String::new(), false) {
         Ok(found) => {
             let named = found.deviations.lines();
@@ -204,8 +204,8 @@ fn of_parts(drives: [&str; 2]) -> Qualified {
     runs.iter_mut().for_each(Run::repeat);
     let [one, other] = &mut runs;
     let facts = QualificationFacts::of(one);
-    let mut watched = Watched::new(one);
-    watched.others.push(Watched::new(other));
+    let mut watched = WatchedRig::new(one);
+    watched.others.push(WatchedRig::new(other));
     let qualified = Qualification::new(facts).settle(&mut watched, String::new(), false);
     qualified.expect("rings that are played to the end")
 }

@@ -33,8 +33,12 @@ fn plan(text: &str) -> Plan {
 fn guarded(text: &str, limits: Limits) -> Outcome {
     let plan = plan(text);
     let [outcome, in_real_time] = [Span::ZERO, Span::from_millis(20)].map(|tolerance| {
-        let never = Failing::new(bench(&plan), Trouble::Interrupted, When::Begin(usize::MAX));
-        let mut line = guard_rings(Failing { tolerance, ..never }, limits);
+        let never = FailingLink::new(
+            bench(&plan),
+            Trouble::Interrupted,
+            TroubleMoment::Begin(usize::MAX),
+        );
+        let mut line = guard_rings(FailingLink { tolerance, ..never }, limits);
         line.assume_fresh();
         twice(&plan, &mut line)
     });
@@ -131,7 +135,7 @@ fn a_denial_in_a_telegram_is_played_again() {
 
 /// When a link gets into trouble.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum When {
+enum TroubleMoment {
     /// As soon as this number of bytes has been sent.
     Sent(usize),
     /// As soon as this number of bytes has been received.
@@ -143,19 +147,19 @@ enum When {
 }
 
 /// A link that gets into trouble, or into a record without room.
-struct Failing<L> {
+struct FailingLink<L> {
     link: L,
     trouble: Trouble,
     full: bool,
     /// Of a link in real time.
     tolerance: Span,
-    when: When,
+    when: TroubleMoment,
     counts: [usize; 3],
     failed: bool,
 }
 
-impl<L: Link> Failing<L> {
-    fn new(link: L, trouble: Trouble, when: When) -> Self {
+impl<L: Link> FailingLink<L> {
+    fn new(link: L, trouble: Trouble, when: TroubleMoment) -> Self {
         Self {
             link,
             trouble,
@@ -170,15 +174,15 @@ impl<L: Link> Failing<L> {
     fn look(&mut self) {
         let [sent, received, begun] = self.counts;
         self.failed |= match self.when {
-            When::Sent(n) => sent >= n,
-            When::Received(n) => received >= n,
-            When::Begin(n) => begun >= n,
-            When::At(at) => self.link.now() >= Instant::START + at,
+            TroubleMoment::Sent(n) => sent >= n,
+            TroubleMoment::Received(n) => received >= n,
+            TroubleMoment::Begin(n) => begun >= n,
+            TroubleMoment::At(at) => self.link.now() >= Instant::START + at,
         };
     }
 }
 
-impl<L: Link> Line for Failing<L> {
+impl<L: Link> Line for FailingLink<L> {
     fn medium(&self, port: usize) -> Medium {
         self.link.medium(port)
     }
@@ -219,7 +223,7 @@ impl<L: Link> Line for Failing<L> {
     }
 }
 
-impl<L: Link> Link for Failing<L> {
+impl<L: Link> Link for FailingLink<L> {
     fn capabilities(&self) -> &[Capability] {
         self.link.capabilities()
     }
@@ -270,19 +274,28 @@ fn troubles() -> [(Trouble, Verdict); 5] {
 }
 
 /// A scenario whose lines hold all the same, and when trouble comes into it.
-const PLACES: &[(&str, When)] = &[
+const PLACES: &[(&str, TroubleMoment)] = &[
     // With the last byte, which no line waits for.
-    ("> 80 80\n", When::Sent(2)),
+    ("> 80 80\n", TroubleMoment::Sent(2)),
     // While the last bytes come round, after the last step.
-    ("> 80 80\n", When::Received(1)),
+    ("> 80 80\n", TroubleMoment::Received(1)),
     // At a step that lets no time pass.
-    ("> 80\n< 80\n? received 1 bytes\n", When::Received(1)),
-    ("> 80\n< 80\nwait 5ms\n", When::At(Span::from_millis(3))),
-    ("> 80\n< 80\nrecover\n", When::Sent(23)),
-    ("read-byte 0 FE10 = 00\n", When::Received(4)),
-    ("master count = 2\n", When::At(Span::from_millis(1))),
+    (
+        "> 80\n< 80\n? received 1 bytes\n",
+        TroubleMoment::Received(1),
+    ),
+    (
+        "> 80\n< 80\nwait 5ms\n",
+        TroubleMoment::At(Span::from_millis(3)),
+    ),
+    ("> 80\n< 80\nrecover\n", TroubleMoment::Sent(23)),
+    ("read-byte 0 FE10 = 00\n", TroubleMoment::Received(4)),
+    (
+        "master count = 2\n",
+        TroubleMoment::At(Span::from_millis(1)),
+    ),
     // A line does not hold, and the trouble comes behind it.
-    ("> 80 80\n< 81\n", When::Received(2)),
+    ("> 80 80\n< 81\n", TroubleMoment::Received(2)),
 ];
 
 #[test]
@@ -290,7 +303,7 @@ fn trouble_ends_an_attempt_wherever_it_comes() {
     for (trouble, verdict) in troubles() {
         for (steps, when) in PLACES {
             let plan = plan(&format!("ring 2\n{steps}"));
-            let mut link = Failing::new(bench(&plan), trouble.clone(), *when);
+            let mut link = FailingLink::new(bench(&plan), trouble.clone(), *when);
             let outcome = twice(&plan, &mut link);
             assert_eq!(outcome.verdict, verdict, "{steps:?} {when:?}: {outcome:?}");
             ends(&outcome, verdict, &trouble.to_string());
@@ -307,8 +320,12 @@ fn trouble_around_the_steps_ends_the_attempt_too() {
     ends(&twice(&plan(text), &mut other()), Verdict::Passed, "");
     for (trouble, verdict) in troubles() {
         // The second conversation is the scenario's own, the third one sets the cells back.
-        for when in [When::Sent(1), When::Begin(2), When::Begin(3)] {
-            let mut link = Failing::new(other(), trouble.clone(), when);
+        for when in [
+            TroubleMoment::Sent(1),
+            TroubleMoment::Begin(2),
+            TroubleMoment::Begin(3),
+        ] {
+            let mut link = FailingLink::new(other(), trouble.clone(), when);
             let outcome = twice(&plan(text), &mut link);
             ends(&outcome, verdict, &trouble.to_string());
         }
@@ -320,9 +337,9 @@ fn trouble_around_the_steps_ends_the_attempt_too() {
 fn a_full_record_is_noticed_behind_the_last_step() {
     for (steps, when) in PLACES.iter().take(4) {
         let plan = plan(&format!("ring 2\n{steps}"));
-        let mut link = Failing {
+        let mut link = FailingLink {
             full: true,
-            ..Failing::new(bench(&plan), Trouble::Interrupted, *when)
+            ..FailingLink::new(bench(&plan), Trouble::Interrupted, *when)
         };
         let outcome = play(&plan, &mut link, AtMismatch::Stop);
         ends(

@@ -41,16 +41,16 @@ const CUT: [ClientRole; 1] = [ClientRole::Cut];
 const CUT_BY_TWO: [ClientRole; 2] = [ClientRole::Upstream, ClientRole::Downstream];
 
 /// An observed byte: what was sent, what arrived, with which error.
-type Seen = (Option<u8>, Option<u8>, Option<LineError>);
+type ObservedByte = (Option<u8>, Option<u8>, Option<LineError>);
 
 /// A ring of four that is served; it ends with this value.
-struct Served {
+struct ServedRing {
     /// The ring, then the inner links.
     rings: ServedRings,
     marks: bool,
 }
 
-impl Served {
+impl ServedRing {
     /// Serves a ring of four, with inner links: what the client does there, and the link. Several places are as many ports.
     fn start(transport: &str, marks: bool, inner: &[(&[ClientRole], usize)]) -> Self {
         let roles = inner.iter().flat_map(|(roles, link)| {
@@ -117,7 +117,7 @@ fn play(link: &mut dyn Link, faults: &[(u64, LinkFault)]) -> [Vec<Received>; 2] 
 }
 
 /// What a link carried.
-fn column(link: &dyn Link, place: usize) -> Vec<Seen> {
+fn column(link: &dyn Link, place: usize) -> Vec<ObservedByte> {
     let bytes = link.trace(0).channels[place].octets().to_vec();
     let seen = bytes
         .iter()
@@ -163,7 +163,7 @@ fn faults() -> Vec<(&'static str, Vec<(u64, LinkFault)>)> {
 
 /// Every fault at an interposer against the simulator: at the master and on the link itself.
 fn interposer(transport: &str) {
-    let served = Served::start(transport, true, &[(&CUT, MIDDLE)]);
+    let served = ServedRing::start(transport, true, &[(&CUT, MIDDLE)]);
     let mut link = served.interposed();
     // The served ring may take a while to begin.
     let begun = (0..50).any(|_| !exchange(&mut link, &SYNCOS).is_empty());
@@ -230,7 +230,7 @@ fn every_fault_at_an_interposer_on_a_pty() {
 
 #[test]
 fn an_interposer_with_two_ports() {
-    let served = Served::start("tcp", true, &[(&CUT_BY_TWO, MIDDLE)]);
+    let served = ServedRing::start("tcp", true, &[(&CUT_BY_TWO, MIDDLE)]);
     let ports = InnerPorts::TwoPortInterposer(served.wire(1), served.wire(2));
     let mut link = served.link(vec![InnerLink::new(0, MIDDLE, ports)]);
     plays_alike(&mut link, "flip 0", &[(10, flip(1))]);
@@ -239,7 +239,7 @@ fn an_interposer_with_two_ports() {
 /// The end of our conversation does not cut the ring of another client's conversation.
 #[test]
 fn an_interposer_goes_on_behind_an_interruption() {
-    let served = Served::start("tcp", true, &[(&CUT, MIDDLE)]);
+    let served = ServedRing::start("tcp", true, &[(&CUT, MIDDLE)]);
     let inner = InnerLink::new(0, MIDDLE, InnerPorts::Interposer(served.wire(1)));
     let ring = vec![(served.wire(0), 4)];
     let interrupt: Arc<AtomicBool> = Arc::default();
@@ -259,7 +259,7 @@ fn an_interposer_goes_on_behind_an_interruption() {
 /// The column of a tapped link is the simulator's, byte for byte; a byte is seen when it has arrived, and then it is
 /// as late as the ring is long.
 fn tapped(transport: &str, marks: bool) {
-    let served = Served::start(transport, marks, &[(&TAP, 1), (&TAP, 3)]);
+    let served = ServedRing::start(transport, marks, &[(&TAP, 1), (&TAP, 3)]);
     let taps = [(1, 1), (2, 3)];
     let inner =
         taps.map(|(wire, place)| InnerLink::new(0, place, InnerPorts::Tap(served.wire(wire))));
@@ -311,7 +311,7 @@ fn plan_of(steps: &str) -> Plan {
 /// The 9.7 scenario on a small ring, in the words of the language; a fault elsewhere is skipped, its link named.
 #[test]
 fn scenarios_at_an_interposer() {
-    let served = Served::start("tcp", true, &[(&CUT, MIDDLE)]);
+    let served = ServedRing::start("tcp", true, &[(&CUT, MIDDLE)]);
     let mut link = served.interposed();
     let plan = plan_of(
         "drive 0..3 model plain\ndrive 2..3 memory FE13 = 88\n\n> 88 FF C0 13 FE D1\n> 88 FE C0 13 FE D1\n! 2->1 byte 10: flip 0\n\
@@ -336,7 +336,7 @@ fn scenarios_at_an_interposer() {
 /// A cut link without a client is open: no byte comes back.
 #[test]
 fn a_cut_link_with_nobody_there_is_open() {
-    let served = Served::start("tcp", true, &[(&CUT, MIDDLE)]);
+    let served = ServedRing::start("tcp", true, &[(&CUT, MIDDLE)]);
     let mut link = served.link(Vec::new());
     assert_eq!(exchange(&mut link, &[0x80; 4]), []);
 }

@@ -1,36 +1,36 @@
 //! Ways in which a master can make a motor turn faster, one by one, in the manual's order of sections where there is one.
 
-use super::{GO, Left, MOST, OVERSHOOT, and, bench, byte, limits, or, play, telegram, word};
+use super::{FoundDrive, GO, MOST, OVERSHOOT, and, bench, byte, limits, or, play, telegram, word};
 use harness_bench::link::Line;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::guard::Limits;
 
 /// Each attack: what was left in the drive, what is sent, and the telegram that must not pass.
-fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
-    let left = Left::default;
-    let analogue = Left {
+fn attacks() -> Vec<(&'static str, FoundDrive, Vec<Vec<u8>>, usize)> {
+    let left = FoundDrive::default;
+    let analogue = FoundDrive {
         configuration: [0xC4, 0xFF, 0x40, 0xFF],
         ..left()
     };
-    let frequency = Left {
+    let frequency = FoundDrive {
         configuration: [0x44, 0xFF, 0x42, 0xFF],
         ..left()
     };
-    let reversing = Left {
+    let reversing = FoundDrive {
         configuration: [0xC4, 0xFF, 0xC3, 0xFF],
         cells: vec![(ram::NSOLL, 8_000)],
         ..left()
     };
-    let stepping = Left {
+    let stepping = FoundDrive {
         configuration: [0xCC, 0xFF, 0x43, 0xFF],
         inputs: 1,
         ..left()
     };
-    let s_ramp = Left {
+    let s_ramp = FoundDrive {
         configuration: [0xC4, 0xFD, 0x43, 0xFB],
         ..left()
     };
-    let calculated = Left {
+    let calculated = FoundDrive {
         cells: vec![(ram::PS_POSITION_H, 0x0010)],
         ..left()
     };
@@ -45,7 +45,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ),
         (
             "analogue input, as it is",
-            Left {
+            FoundDrive {
                 configuration: [0xC4, 0xFF, 0x40, 0xFF],
                 ..left()
             },
@@ -205,7 +205,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ),
         (
             "left nsoll",
-            Left {
+            FoundDrive {
                 cells: vec![(ram::NSOLL, 8_000)],
                 ..left()
             },
@@ -220,7 +220,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ),
         (
             "process data to VCOlin",
-            Left {
+            FoundDrive {
                 data_in: 0x78,
                 ..left()
             },
@@ -229,7 +229,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ),
         (
             "process data to Flags2",
-            Left {
+            FoundDrive {
                 data_in: 0x57,
                 ..left()
             },
@@ -239,7 +239,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ("DataIn", left(), vec![go(), byte(ram::DATA_IN, 0x62)], 1),
         (
             "confirmed error",
-            Left {
+            FoundDrive {
                 cells: vec![(ram::NSOLL, 8_000)],
                 ..left()
             },
@@ -273,7 +273,7 @@ fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {
         ),
         (
             "a reset into the analogue input",
-            Left {
+            FoundDrive {
                 configuration: [0xC4, 0xFF, 0x40, 0xFF],
                 ..left()
             },

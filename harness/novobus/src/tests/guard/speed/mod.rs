@@ -39,7 +39,7 @@ fn limits() -> Limits {
 
 /// What another program has left in a drive, and what is at its plugs.
 #[derive(Clone, Debug)]
-struct Left {
+struct FoundDrive {
     /// `HwVersion`, `HwVersion2`, `SwVersion`, `SwVersion2`.
     configuration: [u8; 4],
     ref_speeds: [i16; 2],
@@ -54,7 +54,7 @@ struct Left {
     eeprom_read_time: Span,
 }
 
-impl Default for Left {
+impl Default for FoundDrive {
     /// As delivered; `nMax` and so `ps_v0` are 3000 rpm, and 10 V are at the analogue input.
     fn default() -> Self {
         Self {
@@ -82,7 +82,7 @@ const SWITCHES: [Input; 6] = [
 
 /// A ring of one that is blocked by its software and released by its inputs, left so by another program, behind a guard that has
 /// read what it must know.
-fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
+fn bench(left: &FoundDrive, limits: Limits) -> Guarded<SimulatedLink> {
     let mut eeprom = factory::eeprom();
     eeprom[0x20..0x24].copy_from_slice(&left.configuration);
     // Blocked after a reset, so that nothing turns before the guard is there.
@@ -145,7 +145,7 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
 }
 
 /// A PLC, where there is one, orders what its mode switches say (13.1.6).
-fn order_by_plc(line: &mut Guarded<SimulatedLink>, left: &Left) {
+fn order_by_plc(line: &mut Guarded<SimulatedLink>, left: &FoundDrive) {
     if left.inputs == 0 {
         return;
     }
@@ -208,7 +208,7 @@ const GO: u8 = !(status::BLOCK | status::STOP);
 /// Sends telegrams until one is denied; which one, and the fastest that the motor turned.
 fn play(
     line: &mut Guarded<SimulatedLink>,
-    left: &Left,
+    left: &FoundDrive,
     telegrams: &[Vec<u8>],
 ) -> (Option<usize>, f64) {
     let mut most = 0.0_f64;
@@ -226,9 +226,9 @@ fn play(
 /// What the limit allows works: the whole of the driver's functions at speeds within it, counted in the drive's range.
 #[test]
 fn motion_within_the_limit_passes() {
-    let left = Left {
+    let left = FoundDrive {
         ref_speeds: [700, -100],
-        ..Left::default()
+        ..FoundDrive::default()
     };
     let mut line = bench(&left, limits());
     {
@@ -261,9 +261,9 @@ fn the_range_of_speeds() {
         (0xFF, 1_132, "0.2649 rpm in the drive's range to 8000 rpm"),
         (0x7F, 566, "0.5298 rpm in the drive's range to 12000 rpm"),
     ] {
-        let left = Left {
+        let left = FoundDrive {
             configuration: [0xC4, 0xFF, 0x43, second],
-            ..Left::default()
+            ..FoundDrive::default()
         };
         for sign in [1, -1_i16] {
             let raw = |raw: i16| (sign * raw).cast_unsigned();
@@ -295,16 +295,16 @@ fn what_is_forgotten() {
         line.trouble().is_none()
     };
     let run = or(ram::FLAGS2, 0x08);
-    let mut line = bench(&Left::default(), limits());
+    let mut line = bench(&FoundDrive::default(), limits());
     assert!(known(&mut line, &word(ram::PS_V0, 100)) && known(&mut line, &run));
     line.synchronise();
     assert!(
         !known(&mut line, &run),
         "what was written before a recovery"
     );
-    let slow = Left {
+    let slow = FoundDrive {
         cells: vec![(ram::PS_V0, 100)],
-        ..Left::default()
+        ..FoundDrive::default()
     };
     let mut line = bench(&slow, limits());
     line.synchronise();
@@ -324,10 +324,10 @@ fn what_is_forgotten() {
 #[test]
 fn a_read_that_is_under_way_changes_what_is_written() {
     const SW_VERSION: u8 = 0x22;
-    let left = Left {
+    let left = FoundDrive {
         stored: Some((0x60, SW_VERSION)),
         eeprom_read_time: Span::from_millis(30),
-        ..Left::default()
+        ..FoundDrive::default()
     };
     let poll = telegram(&[0xC0, 0x8A, 0xFD]);
     let address = || byte(ram::EEPROM_BUFFER, 0x60);
@@ -398,9 +398,9 @@ fn process_data_go_where_they_may() {
     };
     let data = || vec![0x85, 0xFF, 0x00, 0x40];
     let denied = |data_in, limits, sent: &[Vec<u8>]| {
-        let left = Left {
+        let left = FoundDrive {
             data_in,
-            ..Left::default()
+            ..FoundDrive::default()
         };
         let mut line = bench(&left, limits);
         let denied = play(&mut line, &left, sent).0;
@@ -421,7 +421,7 @@ fn process_data_go_where_they_may() {
         reset: true,
         ..motion
     };
-    let left = Left::default();
+    let left = FoundDrive::default();
     let mut line = bench(&left, resets);
     assert_eq!(play(&mut line, &left, &[telegram(&[0xDD, 0x21])]).0, None);
     line.synchronise();

@@ -1,7 +1,8 @@
 //! Random drives and random bytes.
 
 use super::{
-    GO, Left, MOST, OVERSHOOT, and, bench, byte, limits, or, order_by_plc, telegram, watch, word,
+    FoundDrive, GO, MOST, OVERSHOOT, and, bench, byte, limits, or, order_by_plc, telegram, watch,
+    word,
 };
 use crate::gate::GuardsRings as _;
 use harness_bench::link::{Line, Octets, Trouble};
@@ -10,7 +11,7 @@ use harness_proto::nd21::ram;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-fn left() -> impl Strategy<Value = Left> {
+fn left() -> impl Strategy<Value = FoundDrive> {
     let configuration = (
         prop_oneof![3 => Just(0xC4_u8), 1 => Just(0xCC), 1 => Just(0x44), 1 => Just(0x4C)],
         prop_oneof![3 => Just(0xFF_u8), 1 => Just(0xED)],
@@ -36,7 +37,7 @@ fn left() -> impl Strategy<Value = Left> {
         any::<u8>(),
     )
         .prop_map(
-            |(configuration, ref_speeds, vtippen, cells, data_in, analogue, inputs)| Left {
+            |(configuration, ref_speeds, vtippen, cells, data_in, analogue, inputs)| FoundDrive {
                 configuration: configuration.into(),
                 ref_speeds,
                 vtippen,
@@ -48,7 +49,7 @@ fn left() -> impl Strategy<Value = Left> {
                 },
                 analogue,
                 inputs,
-                ..Left::default()
+                ..FoundDrive::default()
             },
         )
 }
@@ -176,7 +177,7 @@ fn piece() -> impl Strategy<Value = Vec<u8>> {
 /// A nominal speed within the limit, over which the regulator shoots by 3.2 %: the limit is one of nominal speeds.
 #[test]
 fn a_regulator_overshoots() {
-    let left = Left {
+    let left = FoundDrive {
         configuration: [0x44, 0xFF, 0x43, 0x7F],
         ref_speeds: [0, 0],
         vtippen: 0,
@@ -184,7 +185,7 @@ fn a_regulator_overshoots() {
         data_in: 8,
         analogue: 0,
         inputs: 0,
-        ..Left::default()
+        ..FoundDrive::default()
     };
     let mut line = bench(&left, limits());
     let mut most = watch(&mut line, 20);
