@@ -26,7 +26,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
-pub type Found = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
+pub type FoundScenario = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
 
 /// How serving ended.
 pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
@@ -42,7 +42,7 @@ pub struct Bus {
     /// The built-in scenario that shows it at work.
     pub example: &'static str,
     /// Reads and settles a scenario.
-    pub settle: fn(&Source, BenchSize) -> Found,
+    pub settle: fn(&Source, BenchSize) -> FoundScenario,
     /// Writes what a scenario says and reads it again, in tests: a panic, if that is another scenario.
     pub comes_back: fn(&Source) -> Result<(), Problems>,
     /// The names of what its drives hold, for completions.

@@ -151,14 +151,14 @@ pub enum ErrorMarks {
 
 /// What was received at a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum HeardPiece {
     /// An octet with its line status.
     Octet(Received),
     /// A frame, or what went wrong with one.
     Frame(can::CanEvent),
 }
 
-impl Heard {
+impl HeardPiece {
     /// The octet, if it is one.
     #[must_use]
     pub const fn octet(self) -> Option<Received> {

@@ -1,7 +1,7 @@
 //! Captures as other people's adapters, analysers and programs write them: a master 3, a NORDAC inverter 5, and other devices.
 
 use super::capture;
-use harness_bench::capture::{Imported, JudgedFrames, ReadSettings, read_with};
+use harness_bench::capture::{ImportedCapture, JudgedFrames, ReadSettings, read_with};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 
@@ -144,7 +144,7 @@ pub(super) fn settings(links: &[&str]) -> ReadSettings {
     }
 }
 
-pub(super) fn imported(file: &[u8], links: &[&str]) -> Imported {
+pub(super) fn imported(file: &[u8], links: &[&str]) -> ImportedCapture {
     read_with(file, &settings(links)).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -156,7 +156,10 @@ pub(super) fn refused(file: &[u8], links: &[&str], words: &str) {
 }
 
 /// The verdict, how many replies were compared, and of how many; with what there is to say about it.
-pub(super) fn judged(imported: &Imported, named: &[u8]) -> ((Verdict, usize, usize), JudgedFrames) {
+pub(super) fn judged(
+    imported: &ImportedCapture,
+    named: &[u8],
+) -> ((Verdict, usize, usize), JudgedFrames) {
     let judged =
         capture::judged(&imported.capture.traces, None, (named, Span::ZERO)).expect("no setup");
     let (verdict, _) = imported.settle(judged.verdict);

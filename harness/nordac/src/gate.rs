@@ -2,7 +2,7 @@
 
 use harness_bench::guard::{Denied, Gate, Guarded};
 use harness_bench::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::limit::LimitSetting;
 use harness_proto::nordac::guard::{self, Denial, GuardedSlave, Limits, Missing};
 use harness_proto::profibus::BusRate;
@@ -125,8 +125,8 @@ impl Gate for LineGate {
         }
     }
 
-    fn hear(&mut self, heard: &Heard) {
-        if let Heard::Octet(octet) = heard {
+    fn hear(&mut self, heard: &HeardPiece) {
+        if let HeardPiece::Octet(octet) = heard {
             let good = octet.error.is_none().then_some(octet.byte);
             self.gate.hear(good);
         }

@@ -2,7 +2,7 @@
 
 use harness_bench::link::bench_clock::BenchClock;
 use harness_bench::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Parameter, PpoType, Properties};
 use harness_proto::profibus::BusRate;
@@ -306,11 +306,11 @@ impl Line for Bench {
         self.clock.since_origin(self.clock.left)
     }
 
-    fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _port: usize) -> Option<(Instant, HeardPiece)> {
         let now = self.clock.now;
         self.heard_at().filter(|at| *at <= now)?;
         let (at, octet) = self.host()?.receive()?;
-        Some((self.clock.since_origin(at), Heard::Octet(octet)))
+        Some((self.clock.since_origin(at), HeardPiece::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

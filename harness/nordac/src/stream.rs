@@ -9,7 +9,7 @@ use harness_bench::link::pump::{Pump, SLACK};
 use harness_bench::link::{
     Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble,
 };
-use harness_bench::medium::{Heard, Medium, Out, Pieces};
+use harness_bench::medium::{HeardPiece, Medium, Out, Pieces};
 use harness_bench::port::{LastWords, Switch, Wire};
 use harness_bench::rig::playing::ON_PORT;
 use harness_proto::decode::Decoded;
@@ -198,9 +198,9 @@ impl Line for SegmentLink {
         self.pump.send(port, what.octets())
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         let (at, octet) = self.pump.receive(port)?;
-        Some((at, Heard::Octet(octet)))
+        Some((at, HeardPiece::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

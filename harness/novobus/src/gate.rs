@@ -6,7 +6,7 @@ use harness_bench::guard::{Denied, Gate, Guarded, Restore};
 use harness_bench::link::{
     Capability, DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault,
 };
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
@@ -191,7 +191,7 @@ impl Gate for RingGate {
         Ok(())
     }
 
-    fn hear(&mut self, heard: &Heard) {
+    fn hear(&mut self, heard: &HeardPiece) {
         if let Some(octet) = heard.octet() {
             self.guard.hear(octet);
         }

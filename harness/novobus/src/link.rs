@@ -3,7 +3,7 @@
 use harness_bench::link::{
     AnyStimulus, Capability, Line, Link, Moment, Octets, PlacedFault, link_name,
 };
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::bits::{flags2, selftest};
 use harness_proto::nd21::{ee, ram};
@@ -342,9 +342,9 @@ impl Line for SimulatedLink {
         self.since_origin(sent_by)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         let (at, received, _) = self.receive_with_cause(ring)?;
-        Some((at, Heard::Octet(received)))
+        Some((at, HeardPiece::Octet(received)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

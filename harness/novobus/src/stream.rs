@@ -9,7 +9,7 @@ use harness_bench::link::pump::{Pump, Spot};
 use harness_bench::link::{
     Capability, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble, link_name,
 };
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::port::{LastWords, Switch, Wire};
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
@@ -156,9 +156,9 @@ impl Line for StreamLink {
         self.pump.send(ring, what.octets())
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         let (at, octet) = self.pump.receive(ring)?;
-        Some((at, Heard::Octet(octet)))
+        Some((at, HeardPiece::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

@@ -3,7 +3,7 @@
 use crate::valve::Valve;
 use harness_bench::link::bench_clock::BenchClock;
 use harness_bench::link::{Capability, Line, Link, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
 use harness_sim::participant::Participant;
@@ -79,11 +79,11 @@ impl Line for Bench {
         self.clock.since_origin(self.clock.left)
     }
 
-    fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _port: usize) -> Option<(Instant, HeardPiece)> {
         let now = self.clock.now;
         self.heard_at().filter(|at| *at <= now)?;
         let (at, heard) = self.host()?.receive()?;
-        Some((self.clock.since_origin(at), Heard::Frame(heard)))
+        Some((self.clock.since_origin(at), HeardPiece::Frame(heard)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

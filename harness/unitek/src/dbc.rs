@@ -71,7 +71,7 @@ impl Signal {
     }
 }
 
-struct Message {
+struct DbcMessage {
     id: u16,
     name: String,
     length: u8,
@@ -106,7 +106,7 @@ pub(crate) fn dbc(drives: u16) -> String {
     text
 }
 
-fn messages(drive: u16, drives: u16) -> [Message; 2] {
+fn messages(drive: u16, drives: u16) -> [DbcMessage; 2] {
     let node = format!("Drive{}", drive + 1);
     let prefix = if drives == 1 { "Drive" } else { &node };
     let mut sent = read_request();
@@ -115,7 +115,7 @@ fn messages(drive: u16, drives: u16) -> [Message; 2] {
     let mut heard = vec![regid()];
     heard.extend(REGISTERS.iter().flat_map(of_register));
     [
-        Message {
+        DbcMessage {
             id: DEFAULT_RX + drive,
             name: format!("{prefix}Rx"),
             length: 5,
@@ -124,7 +124,7 @@ fn messages(drive: u16, drives: u16) -> [Message; 2] {
             signals: sent,
             comment: "To the drive: 3 bytes write 16 bits of a register, 5 bytes write 32 bits, REGID 3D reads one (4.1, 5.2)",
         },
-        Message {
+        DbcMessage {
             id: DEFAULT_TX + drive,
             name: format!("{prefix}Tx"),
             length: 6,
@@ -300,7 +300,7 @@ fn comment(register: &Register) -> String {
     text.trim_start_matches("; ").to_owned()
 }
 
-fn declaration(text: &mut String, message: &Message) {
+fn declaration(text: &mut String, message: &DbcMessage) {
     put(
         text,
         format_args!(
@@ -330,7 +330,7 @@ fn declaration(text: &mut String, message: &Message) {
     }
 }
 
-fn comments(text: &mut String, message: &Message) {
+fn comments(text: &mut String, message: &DbcMessage) {
     let id = message.id;
     put(
         text,
@@ -343,7 +343,7 @@ fn comments(text: &mut String, message: &Message) {
     }
 }
 
-fn value_names(text: &mut String, message: &Message) {
+fn value_names(text: &mut String, message: &DbcMessage) {
     let named = |signal: &&Signal| !signal.values.is_empty();
     for signal in message.signals.iter().filter(named) {
         put(text, format_args!("VAL_ {} {}", message.id, signal.name));

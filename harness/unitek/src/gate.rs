@@ -2,7 +2,7 @@
 
 use harness_bench::guard::{Denied, Gate, Guarded};
 use harness_bench::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::limit::LimitSetting;
 use harness_proto::time::Instant;
@@ -117,12 +117,12 @@ impl Gate for SegmentGate {
         }
     }
 
-    fn hear(&mut self, heard: &Heard) {
+    fn hear(&mut self, heard: &HeardPiece) {
         match heard {
-            Heard::Frame(can::CanEvent::Frame(frame)) => self.gate.overhear(frame),
+            HeardPiece::Frame(can::CanEvent::Frame(frame)) => self.gate.overhear(frame),
             // The bench's own last frame may be lost.
-            Heard::Frame(can::CanEvent::Error(_)) => self.gate.doubt(),
-            Heard::Octet(_) => {}
+            HeardPiece::Frame(can::CanEvent::Error(_)) => self.gate.doubt(),
+            HeardPiece::Octet(_) => {}
         }
     }
 

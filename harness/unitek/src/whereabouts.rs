@@ -3,7 +3,7 @@
 use crate::gate::GuardsSegment as _;
 use harness_bench::guard::Guarded;
 use harness_bench::link::Line;
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::can::{self, BadFrame, Frame};
 use harness_proto::time::Span;
 use harness_proto::unitek::frame::{Data, Reply, Request};
@@ -40,7 +40,7 @@ impl<L: Line> Search<'_, L> {
         let end = self.line.send(0, Out::Frames(&[frame])) + self.patience;
         loop {
             while let Some((_, heard)) = self.line.receive(0) {
-                let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+                let HeardPiece::Frame(can::CanEvent::Frame(frame)) = heard else {
                     continue;
                 };
                 let reply = |tx: &u16| Some((*tx, Reply::decode(&frame, *tx).ok()?));
@@ -213,7 +213,7 @@ pub(super) fn still_sent<L: Line>(line: &mut Guarded<L>, first: u16, at: (u16, u
         while line.now() < end && line.trouble().is_none() {
             line.wait(end);
             while let Some((_, heard)) = line.receive(0) {
-                let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+                let HeardPiece::Frame(can::CanEvent::Frame(frame)) = heard else {
                     continue;
                 };
                 let shown = Reply::decode(&frame, at.1).map(|reply| reply.register);

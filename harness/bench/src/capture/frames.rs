@@ -2,7 +2,7 @@
 
 use super::import::candump_time;
 use super::order::{Counts, Place, ordered};
-use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
+use super::{Capture, CaptureError, ChannelTarget, ImportedCapture, NamedLink};
 use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
 use harness_proto::can::{BitRate, CanError, Frame, Id};
@@ -46,7 +46,11 @@ pub(super) struct FrameRead {
 }
 
 /// The capture of these frames, which are in the order of their file.
-pub(super) fn assemble(frames: Vec<FrameRead>, counts: Counts, rate: Option<BitRate>) -> Imported {
+pub(super) fn assemble(
+    frames: Vec<FrameRead>,
+    counts: Counts,
+    rate: Option<BitRate>,
+) -> ImportedCapture {
     let rate = rate.unwrap_or(BitRate::K500);
     let length = |frame: &Frame| rate.time_of(frame.wire_bits());
     let ordered = ordered(frames, counts, |read| length(&read.frame));
@@ -72,7 +76,7 @@ pub(super) fn assemble(frames: Vec<FrameRead>, counts: Counts, rate: Option<BitR
         listened: None,
         timed: true,
     };
-    Imported {
+    ImportedCapture {
         notes: ordered.notes,
         ..capture.into()
     }
@@ -159,7 +163,7 @@ pub(super) struct Log {
 ///
 /// # Errors
 /// Frames of several channels; a frame of CAN FD on the chosen one.
-pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureError> {
+pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<ImportedCapture, CaptureError> {
     let Log {
         frames,
         mut notes,
@@ -208,7 +212,7 @@ pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureE
     let mut imported = assemble(frames, Counts::Lines, None);
     imported.capture.timed = timed;
     notes.extend(imported.notes);
-    Ok(Imported {
+    Ok(ImportedCapture {
         notes,
         lost,
         ..imported
@@ -307,7 +311,7 @@ pub(super) fn is_json(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// What is wrong, and at which frame.
-pub(super) fn json(bytes: &[u8]) -> Result<Imported, CaptureError> {
+pub(super) fn json(bytes: &[u8]) -> Result<ImportedCapture, CaptureError> {
     let object: Object = serde_json::from_slice(bytes).map_err(|error| CaptureError::Link {
         place: format!("line {}, column {}", error.line(), error.column()),
         what: format!("{error}"),

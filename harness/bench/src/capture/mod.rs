@@ -22,7 +22,7 @@ pub mod senders;
 pub mod tape;
 pub mod telegrams;
 
-pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
+pub use import::{ChannelTarget, ImportedCapture, NamedLink, ReadSettings, UartFormat};
 
 pub use judged::{JudgeOptions, JudgedCapture, JudgedFrames, judged_frames, replayed_frames};
 pub use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
@@ -103,7 +103,10 @@ pub enum CaptureError {
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_files(paths: &[PathBuf], settings: &ReadSettings) -> Result<Imported, CaptureError> {
+pub fn read_files(
+    paths: &[PathBuf],
+    settings: &ReadSettings,
+) -> Result<ImportedCapture, CaptureError> {
     let mut files = Vec::new();
     let mut left = MAX_FILE;
     for path in paths {
@@ -140,7 +143,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
 ///
 /// # Errors
 /// [`CaptureError`], but not that of the file itself.
-pub fn read_with(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
+pub fn read_with(bytes: &[u8], settings: &ReadSettings) -> Result<ImportedCapture, CaptureError> {
     if bytes.len() as u64 > MAX_FILE {
         return Err(CaptureError::TooLong);
     }

@@ -1,7 +1,7 @@
 //! Captures in pcap, the format before pcapng: one interface without a name, times in microseconds or nanoseconds.
 
 use super::pcapng::{LINK_TYPES, Packet, PcapngReader, finish, nanoseconds};
-use super::{CaptureError, Imported, NamedLink};
+use super::{CaptureError, ImportedCapture, NamedLink};
 use crate::report::pcapng::NANOSECONDS;
 use harness_proto::line::Rate;
 
@@ -34,7 +34,7 @@ pub(super) fn read(
     bytes: &[u8],
     rate: Option<Rate>,
     links: &[NamedLink],
-) -> Result<Imported, CaptureError> {
+) -> Result<ImportedCapture, CaptureError> {
     let mut reader = PcapngReader::new(bytes, links);
     let Some((big, resolution)) = kind(bytes) else {
         return reader.wrong(0, "no magic number of pcap is here");

@@ -22,7 +22,7 @@ use super::import::unread_octets;
 use super::order::Counts;
 use super::senders::LineRead;
 use super::telegrams::{self, DAY};
-use super::{Assembly, Capture, CaptureError, Imported, NamedLink, line_byte};
+use super::{Assembly, Capture, CaptureError, ImportedCapture, NamedLink, line_byte};
 use crate::counted::counted;
 use crate::report::pcapng::{
     END, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, MAGIC, PACKET, SECTION,
@@ -72,7 +72,7 @@ pub fn read(
     bytes: &[u8],
     rate: Option<Rate>,
     links: &[NamedLink],
-) -> Result<Imported, CaptureError> {
+) -> Result<ImportedCapture, CaptureError> {
     let mut reader = PcapngReader::new(bytes, links);
     let mut offset = 0;
     while offset < bytes.len() {
@@ -85,7 +85,7 @@ pub fn read(
 pub(super) fn finish(
     mut reader: PcapngReader<'_>,
     rate: Option<Rate>,
-) -> Result<Imported, CaptureError> {
+) -> Result<ImportedCapture, CaptureError> {
     reader.no_twins()?;
     reader.cooked_frames()?;
     let events = std::mem::take(&mut reader.events);
@@ -107,11 +107,11 @@ pub(super) fn finish(
         .or(cut.then(|| "packets were cut".to_owned()));
     imported.lost |= lost;
     notes.append(&mut imported.notes);
-    Ok(Imported { notes, ..imported })
+    Ok(ImportedCapture { notes, ..imported })
 }
 
 /// The capture of the part that is wanted.
-fn part(reader: PcapngReader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError> {
+fn part(reader: PcapngReader<'_>, rate: Option<Rate>) -> Result<ImportedCapture, CaptureError> {
     if reader.parts.is_empty() {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
@@ -153,7 +153,7 @@ fn part(reader: PcapngReader<'_>, rate: Option<Rate>) -> Result<Imported, Captur
             let read = LineRead::of(&octets, octet, true);
             let unread = unread_octets(&read);
             let capture = telegrams::assemble(std::iter::empty(), read.octets, octet);
-            return Ok(Imported {
+            return Ok(ImportedCapture {
                 notes: read.notes,
                 unread,
                 ..capture.into()

@@ -2,7 +2,7 @@
 
 use super::record::RecordLine;
 use crate::link::{Lead, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble};
-use crate::medium::{Heard, Pieces};
+use crate::medium::{HeardPiece, Pieces};
 use crate::report::pcapng::error_named;
 use crate::scenario::run::record::{from_hex, hex};
 use harness_proto::can::{self, CanError, Frame};
@@ -95,7 +95,7 @@ impl RecordLine {
                 t: units(at),
                 frames: frames.iter().map(Frame::to_string).collect(),
             },
-            LinkEvent::Received(ring, at, Heard::Octet(byte)) => {
+            LinkEvent::Received(ring, at, HeardPiece::Octet(byte)) => {
                 let (byte, error) = written(*byte);
                 Self::Received {
                     ring: ring + 1,
@@ -104,7 +104,7 @@ impl RecordLine {
                     error,
                 }
             }
-            LinkEvent::Received(ring, at, Heard::Frame(heard)) => Self::Frame {
+            LinkEvent::Received(ring, at, HeardPiece::Frame(heard)) => Self::Frame {
                 ring: ring + 1,
                 t: units(at),
                 frame: match heard {
@@ -215,7 +215,7 @@ impl RecordLine {
                     (None, Some(error)) => can::CanEvent::Error(CanError::from_name(error)?),
                     _ => return None,
                 };
-                LinkEvent::Received(index(ring)?, instant(t), Heard::Frame(heard))
+                LinkEvent::Received(index(ring)?, instant(t), HeardPiece::Frame(heard))
             }
             Self::Received {
                 ring,
@@ -224,7 +224,7 @@ impl RecordLine {
                 error,
             } => {
                 let octet = received(byte, error.as_deref())?;
-                LinkEvent::Received(index(ring)?, instant(t), Heard::Octet(octet))
+                LinkEvent::Received(index(ring)?, instant(t), HeardPiece::Octet(octet))
             }
             Self::Fault {
                 ring,

@@ -1,7 +1,7 @@
 //! What one port may send.
 
 use crate::link::{Line, Moment, PlacedFault};
-use crate::medium::{Heard, Out};
+use crate::medium::{HeardPiece, Out};
 use harness_proto::limit::LimitSetting;
 use harness_proto::time::Instant;
 use std::any::Any;
@@ -58,7 +58,7 @@ pub trait Gate: Any + Send + fmt::Debug {
     fn fault(&mut self, fault: PlacedFault, moment: Moment, settled: bool) -> Result<(), Denied>;
 
     /// Takes notice of what stations have sent.
-    fn hear(&mut self, heard: &Heard) {
+    fn hear(&mut self, heard: &HeardPiece) {
         let _of_no_interest = heard;
     }
 

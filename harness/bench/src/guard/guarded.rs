@@ -5,7 +5,7 @@ use super::gate::{Denied, Gate};
 use crate::link::{
     Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble, wait_keeping,
 };
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use harness_proto::limit::LimitSetting;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -46,7 +46,7 @@ pub struct Guarded<L> {
     refused: usize,
     watch: Option<Box<dyn Watch>>,
     /// Input of port 0 that arrived while the watch looked and belongs to the conversation.
-    unasked: VecDeque<(Instant, Heard)>,
+    unasked: VecDeque<(Instant, HeardPiece)>,
     /// Set when the program is to end; only read if the link behind the guard does not read it itself.
     interrupt: Arc<AtomicBool>,
     /// A fault has been put on a link in the present conversation.
@@ -389,7 +389,7 @@ impl<L: Line> Line for Guarded<L> {
         self.refused
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         let unasked = (port == 0).then(|| self.unasked.pop_front()).flatten();
         let (at, heard) = match unasked {
             Some(piece) => piece,
@@ -555,7 +555,7 @@ impl<L: Link> Link for Guarded<L> {
         let answers = self.inner.probe(port, octets);
         if !copy {
             for &answer in &answers {
-                gate.hear(&Heard::Octet(answer));
+                gate.hear(&HeardPiece::Octet(answer));
             }
         }
         answers

@@ -1,7 +1,7 @@
 //! Queries to drives in the pauses of a conversation.
 
 use crate::link::{Line, Trouble};
-use crate::medium::{Heard, Out};
+use crate::medium::{HeardPiece, Out};
 use harness_proto::time::Instant;
 use std::fmt;
 
@@ -31,13 +31,13 @@ pub trait Watch: Send + fmt::Debug {
     ///
     /// # Errors
     /// Why the conversation must not continue, in a sentence.
-    fn hear(&mut self, heard: &Heard) -> Result<(), String> {
+    fn hear(&mut self, heard: &HeardPiece) -> Result<(), String> {
         let _of_no_interest = heard;
         Ok(())
     }
 
     /// The pieces received during the last look that do not answer it, with their times. They belong to the conversation.
-    fn take_unasked(&mut self) -> Vec<(Instant, Heard)> {
+    fn take_unasked(&mut self) -> Vec<(Instant, HeardPiece)> {
         Vec::new()
     }
 }

@@ -30,7 +30,7 @@ pub use stimulus::AnyStimulus;
 pub(crate) use tamper::is_wrong_parity;
 pub use tamper::{needs_line_errors, only_simulated};
 
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -199,7 +199,7 @@ pub trait Line: Send {
     }
 
     /// Takes the next piece that was received and has not been fetched yet.
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)>;
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)>;
 
     /// Lets time pass until something happens, at most until `until`. Returns false if nothing will ever happen unless the master
     /// sends. Edge-triggered: input that was already reported and is still unread may not be reported again. With
@@ -275,7 +275,7 @@ impl<L: Line + ?Sized> Line for &mut L {
         (**self).refused()
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         (**self).receive(port)
     }
 

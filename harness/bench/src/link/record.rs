@@ -8,7 +8,7 @@
 
 use super::pump::HELD_UP;
 use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{HeardPiece, Medium, Out, Pieces};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -43,7 +43,7 @@ pub enum LinkEvent {
     /// Pieces were sent through a port, counted from 0; the last one will have left at this time.
     Sent(usize, Instant, Pieces),
     /// A piece was received at a port.
-    Received(usize, Instant, Heard),
+    Received(usize, Instant, HeardPiece),
     /// A fault was asked for, at this time.
     Fault(usize, Instant, PlacedFault, Moment),
     /// The link carries nothing more.
@@ -97,7 +97,7 @@ struct CallerView {
     lead: Lead,
     pause: Option<Instant>,
     /// Bytes that are recorded and not yet fetched.
-    came: [VecDeque<(Instant, Heard)>; PORTS],
+    came: [VecDeque<(Instant, HeardPiece)>; PORTS],
 }
 
 impl CallerView {
@@ -164,7 +164,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
     }
 
     /// Fetches what the link has received.
-    fn take_arrived(&mut self) -> Vec<(usize, Instant, Heard)> {
+    fn take_arrived(&mut self) -> Vec<(usize, Instant, HeardPiece)> {
         let mut came = Vec::new();
         for port in 0..PORTS {
             while let Some((at, byte)) = self.link.receive(port) {
@@ -175,7 +175,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
     }
 
     /// Records the state of the link and what was received, where time is real.
-    fn look(&mut self, came: Vec<(usize, Instant, Heard)>) {
+    fn look(&mut self, came: Vec<(usize, Instant, HeardPiece)>) {
         let Some(known) = &mut self.known else {
             return;
         };
@@ -237,7 +237,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         if taken > 0 { end } else { self.now() }
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         if let Some(known) = &mut self.known {
             return known.came.get_mut(port)?.pop_front();
         }

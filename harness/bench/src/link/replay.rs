@@ -13,7 +13,7 @@ use super::{
     is_wrong_parity,
 };
 use crate::counted::counted;
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{HeardPiece, Medium, Out, Pieces};
 use harness_proto::can;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -53,7 +53,7 @@ struct ReplayState {
     busy: bool,
     lead: Lead,
     pause: Option<Instant>,
-    came: [VecDeque<(Instant, Heard)>; 2],
+    came: [VecDeque<(Instant, HeardPiece)>; 2],
     /// When each line is free.
     free: [Instant; 2],
     /// For how long faults of this conversation may hold bytes.
@@ -356,7 +356,7 @@ impl Line for Replay {
         }
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         if let Some(known) = &mut self.known {
             return known.came.get_mut(port)?.pop_front();
         }
@@ -614,11 +614,11 @@ fn pieces_of(what: Out<'_>) -> String {
 }
 
 /// What was heard, in words.
-fn words_of(heard: Heard) -> String {
+fn words_of(heard: HeardPiece) -> String {
     match heard {
-        Heard::Octet(octet) => format!("{:02X}", octet.byte),
-        Heard::Frame(can::CanEvent::Frame(frame)) => frame.to_string(),
-        Heard::Frame(can::CanEvent::Error(error)) => error.to_string(),
+        HeardPiece::Octet(octet) => format!("{:02X}", octet.byte),
+        HeardPiece::Frame(can::CanEvent::Frame(frame)) => frame.to_string(),
+        HeardPiece::Frame(can::CanEvent::Error(error)) => error.to_string(),
     }
 }
 

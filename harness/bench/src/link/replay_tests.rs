@@ -11,7 +11,7 @@ fn ms(at: u64) -> Instant {
 
 /// A byte that comes long after the time until which it was waited for, and one that is sent then.
 fn overslept(tolerance: Span) -> Replay {
-    let byte = Heard::Octet(Received::good(0x80));
+    let byte = HeardPiece::Octet(Received::good(0x80));
     let events = vec![
         LinkEvent::Begin(Instant::START),
         LinkEvent::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
@@ -62,7 +62,7 @@ fn a_wait_ends_at_a_look_at_an_inner_link() {
         LinkEvent::Begin(Instant::START),
         LinkEvent::Tapped(0, 1, Instant::START, vec![byte()]),
         LinkEvent::Tapped(0, 1, ms(3), Vec::new()),
-        LinkEvent::Received(0, ms(4), Heard::Octet(byte())),
+        LinkEvent::Received(0, ms(4), HeardPiece::Octet(byte())),
     ];
     let mut replay = Replay::new(events, Rate::default(), Span::ZERO, vec![1], Vec::new());
     replay.begin();
@@ -137,7 +137,7 @@ fn recorded(looks: bool) -> Vec<LinkEvent> {
         LinkEvent::Fault(0, Instant::START, fault, Moment::Now),
         LinkEvent::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
         look(2, Some(5)),
-        LinkEvent::Received(0, ms(2), Heard::Octet(good)),
+        LinkEvent::Received(0, ms(2), HeardPiece::Octet(good)),
         look(3, Some(5)),
         LinkEvent::Tapped(0, 0, ms(3), vec![good]),
         look(5, Some(5)),

@@ -1,7 +1,7 @@
 //! A computer that stalls, for tests.
 
 use super::{Line, Trouble};
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use harness_proto::time::{Instant, Span};
 
 /// A line behind a computer that stalls for a while after this many telegrams or frames were sent.
@@ -30,7 +30,7 @@ impl<L: Line> Line for StandsStill<L> {
         sent
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         self.line.receive(port)
     }
 

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// What becomes of a byte.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Passed {
+pub struct PassedByte {
     /// Bytes that are passed on before it.
     inserted: Vec<Received>,
     /// The byte itself, unless it is lost.
@@ -25,7 +25,7 @@ pub struct Passed {
     pub hold: Option<Span>,
 }
 
-impl Passed {
+impl PassedByte {
     /// The bytes that are passed on, in order.
     pub fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
         let inserted = self.inserted.iter().copied();
@@ -108,9 +108,9 @@ impl Tamper {
     }
 
     /// Passes on a byte at `start`.
-    pub fn pass(&mut self, byte: Received, start: Instant) -> Passed {
+    pub fn pass(&mut self, byte: Received, start: Instant) -> PassedByte {
         self.count += 1;
-        let mut passed = Passed::default();
+        let mut passed = PassedByte::default();
         let mut whole = Some(byte);
         let mut flips = Flips::default();
         for fault in self.armed.remove(&self.count).unwrap_or_default() {
@@ -141,9 +141,9 @@ impl Tamper {
             self.held_until = Some(start + span);
         }
         if self.cut || held {
-            return Passed {
+            return PassedByte {
                 delay: passed.delay,
-                ..Passed::default()
+                ..PassedByte::default()
             };
         }
         if passed.hold.is_none() {

@@ -81,7 +81,7 @@ pub struct TimedPiece<P> {
 
 /// The judgement of a set of worlds on a conversation.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Judged<P> {
+pub enum WorldsVerdict<P> {
     /// A right drive could have sent this.
     Right,
     /// No right drive could: the place of the first piece that none would have sent, one past the end where a piece is missing; and the
@@ -283,7 +283,7 @@ impl<M: RightDrive> Worlds<M> {
 
 /// Whether one of these right drives could have sent what came. They are fresh, and their clocks begin with that of the conversation. If none
 /// could, the judgement is that on the first one.
-pub fn judge<M: RightDrive>(drives: Vec<M>, talk: &Dialogue<M::Piece>) -> Judged<M::Piece> {
+pub fn judge<M: RightDrive>(drives: Vec<M>, talk: &Dialogue<M::Piece>) -> WorldsVerdict<M::Piece> {
     judge_alive(drives, talk, &|| ())
 }
 
@@ -292,19 +292,19 @@ pub fn judge_alive<M: RightDrive>(
     drives: Vec<M>,
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
-) -> Judged<M::Piece> {
+) -> WorldsVerdict<M::Piece> {
     // Drives of different kinds are never merged: each is judged by itself.
     let mut first = None;
     for drive in drives {
         match lost(drive, talk, alive) {
-            Err((Judged::Wrong(place, expected), _)) => {
-                first.get_or_insert(Judged::Wrong(place, expected));
+            Err((WorldsVerdict::Wrong(place, expected), _)) => {
+                first.get_or_insert(WorldsVerdict::Wrong(place, expected));
             }
             Err((other, _)) => return other,
-            Ok(_) => return Judged::Right,
+            Ok(_) => return WorldsVerdict::Right,
         }
     }
-    first.unwrap_or(Judged::Unknown)
+    first.unwrap_or(WorldsVerdict::Unknown)
 }
 
 /// The places, in what was sent, of the pieces that were lost or whose answers were: the fewest with which a right drive could have sent what
@@ -316,7 +316,7 @@ pub fn lost<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
-) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
+) -> Result<Vec<usize>, (WorldsVerdict<M::Piece>, bool)> {
     // When a piece has reached a drive seldom matters: a few worlds may explain what came.
     for heard in [
         HearingTime::AtOnce,
@@ -324,7 +324,7 @@ pub fn lost<M: RightDrive>(
         HearingTime::RepeatsBeforeItsStep,
     ] {
         match lost_in(model.clone(), talk, heard, alive) {
-            Err((Judged::Wrong(..) | Judged::TooMany, _)) => {}
+            Err((WorldsVerdict::Wrong(..) | WorldsVerdict::TooMany, _)) => {}
             found => return found,
         }
     }
@@ -360,7 +360,7 @@ fn lost_in<M: RightDrive>(
     talk: &Dialogue<M::Piece>,
     heard: HearingTime,
     alive: &dyn Fn(),
-) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
+) -> Result<Vec<usize>, (WorldsVerdict<M::Piece>, bool)> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
     worlds.insert(World {
@@ -378,11 +378,11 @@ fn lost_in<M: RightDrive>(
         while let Some(world) = worlds.pop_first() {
             alive();
             if steps > talk.most_steps || worlds.all.len() + explained.all.len() > MOST_WORLDS {
-                return Err((Judged::TooMany, true));
+                return Err((WorldsVerdict::TooMany, true));
             }
             let refuted = talk.refutes(&world, place);
             if !refuted && !world.model.knows() {
-                return Err((Judged::Unknown, true));
+                return Err((WorldsVerdict::Unknown, true));
             }
             stirs |= world.stirs();
             if let Some(said) = world.said.front() {
@@ -414,7 +414,7 @@ fn lost_in<M: RightDrive>(
             }
         }
         if explained.all.is_empty() {
-            return Err((Judged::Wrong(place, expected), stirs));
+            return Err((WorldsVerdict::Wrong(place, expected), stirs));
         }
         worlds = explained;
     }

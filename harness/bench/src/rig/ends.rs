@@ -1,7 +1,7 @@
 //! The two kinds of ring ends that a rig can have, as one link.
 
 use crate::link::{Capability, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -66,7 +66,7 @@ impl Line for Ends {
         each!(self, link => link.send(ring, what))
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         each!(self, link => link.receive(ring))
     }
 

@@ -12,7 +12,7 @@ const MAX_SIZE: u64 = 1 << 20;
 
 /// What may be changed.
 #[derive(Debug, Default)]
-struct Changed {
+struct ChangedNotes {
     /// By scenarios before, which could not put it back.
     kept: Vec<String>,
     /// By the scenario that is played now.
@@ -25,7 +25,7 @@ struct Changed {
 /// was killed.
 #[derive(Clone, Debug, Default)]
 pub struct NotPutBack {
-    changed: Arc<Mutex<Changed>>,
+    changed: Arc<Mutex<ChangedNotes>>,
     file: Option<PathBuf>,
     origin: String,
 }
@@ -46,7 +46,7 @@ impl NotPutBack {
         &self.origin
     }
 
-    fn changed(&self) -> MutexGuard<'_, Changed> {
+    fn changed(&self) -> MutexGuard<'_, ChangedNotes> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -215,7 +215,7 @@ fn unanswered_each_time(attempts: &[Attempt]) -> Option<&str> {
 
 /// When a scenario is played once more.
 #[derive(Clone, Debug)]
-pub struct Again {
+pub struct RetryRule {
     /// How late a byte may be; zero where time is virtual.
     tolerance: Span,
     /// How often drives are made ready where one gives no answer.
@@ -224,7 +224,7 @@ pub struct Again {
     hopeless: BTreeSet<String>,
 }
 
-impl Again {
+impl RetryRule {
     /// On a rig with this tolerance; zero where time is virtual: no computer is busy, and drives that are not ready never will be.
     pub fn new(tolerance: Span) -> Self {
         Self {
@@ -331,7 +331,7 @@ mod tests {
     }
 
     /// How many attempts there are where each ends like this, the last over and over.
-    fn attempts(again: &mut Again, most: usize, ends: &[(Verdict, &str)]) -> usize {
+    fn attempts(again: &mut RetryRule, most: usize, ends: &[(Verdict, &str)]) -> usize {
         let mut played: Vec<Attempt> = Vec::new();
         while again.after(&played, most) {
             let end = ends.get(played.len()).or(ends.last());
@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn whatever_does_not_pass_is_played_again_as_often_as_it_may_be() {
-        let again = &mut Again::new(TOLERANCE);
+        let again = &mut RetryRule::new(TOLERANCE);
         assert_eq!(attempts(again, 3, &[(Passed, "")]), 1);
         assert_eq!(attempts(again, 3, &[(Verdict::RigError, "")]), 1);
         assert_eq!(attempts(again, 1, &[(Failed, "")]), 1);
@@ -373,7 +373,7 @@ mod tests {
     /// Bytes that are late at other places each time were late in the computer: a third attempt shows nothing else.
     #[test]
     fn bytes_that_are_late_elsewhere_end_the_attempts() {
-        let mut again = Again::new(TOLERANCE);
+        let mut again = RetryRule::new(TOLERANCE);
         let mut more = |played: &[Attempt]| again.after(played, 3);
         assert!(more(&[late("a", 40)]));
         assert!(more(&[late("a", 40), late("a", 45)]));
@@ -390,7 +390,7 @@ mod tests {
             late.outcome.shows_nothing = true;
             late
         };
-        let mut again = Again::new(TOLERANCE);
+        let mut again = RetryRule::new(TOLERANCE);
         let mut more = |played: &[Attempt], most| again.after(played, most);
         assert!(more(&[late()], 1));
         assert!(more(&[late(), late(), late()], 2));
@@ -404,7 +404,7 @@ mod tests {
 
     #[test]
     fn a_silent_drive_is_made_ready_again_as_the_computer_may_have_disturbed_it() {
-        let again = &mut Again::new(TOLERANCE);
+        let again = &mut RetryRule::new(TOLERANCE);
         assert_eq!(attempts(again, 1, &[(Failed, DIFFERS)]), 1);
         let disturbed = [(Failed, SILENT), (Passed, "")];
         assert_eq!(attempts(again, 1, &disturbed), 2);
@@ -418,7 +418,7 @@ mod tests {
 
     #[test]
     fn nothing_disturbs_a_drive_where_time_is_virtual() {
-        let again = &mut Again::new(Span::ZERO);
+        let again = &mut RetryRule::new(Span::ZERO);
         assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 

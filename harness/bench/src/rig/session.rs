@@ -4,12 +4,12 @@ use super::left::NotPutBack;
 use super::lock::{PortLock, PortLockError};
 use super::playing::observed::Beats;
 use super::port_file::Port;
-use super::taken::{Taken, take};
+use super::taken::{TakenRig, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep, Watch};
 use crate::link::{Line, PortLink, Trouble};
-use crate::medium::{Heard, Pieces};
+use crate::medium::{HeardPiece, Pieces};
 use crate::port::OpenError;
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
@@ -70,7 +70,7 @@ pub struct RigSession<D: RigDrives> {
     // Given back in this order.
     watchdog: Option<Watchdog>,
     _locks: Vec<PortLock>,
-    taken: Taken,
+    taken: TakenRig,
 }
 
 impl<D: RigDrives> RigSession<D> {
@@ -94,14 +94,14 @@ impl<D: RigDrives> RigSession<D> {
         options: &UseOptions,
         open: OpenDrives<D>,
     ) -> Result<Self, SessionError> {
-        let taken = Taken::begin(rig, None)?;
+        let taken = TakenRig::begin(rig, None)?;
         Self::over(rig, options, (taken, NotPutBack::default()), open)
     }
 
     fn over(
         rig: &Rig,
         options: &UseOptions,
-        (taken, left): (Taken, NotPutBack),
+        (taken, left): (TakenRig, NotPutBack),
         (drives, link, locks): OpenDrives<D>,
     ) -> Result<Self, SessionError> {
         let mut session = Self {
@@ -158,7 +158,7 @@ impl<D: RigDrives> RigSession<D> {
     ///
     /// # Errors
     /// The link is in trouble.
-    pub fn listen(&mut self, mut hear: impl FnMut(Heard)) -> Result<(), SessionError> {
+    pub fn listen(&mut self, mut hear: impl FnMut(HeardPiece)) -> Result<(), SessionError> {
         if self.rig.is_simulated() {
             return Ok(());
         }

@@ -9,12 +9,12 @@ use super::state;
 
 /// A rig in the hands of this program, before its ports are opened. The lock is given back last.
 #[derive(Debug)]
-pub(super) struct Taken {
+pub(super) struct TakenRig {
     pub(super) around: Around,
     pub(super) lock: Option<RigLock>,
 }
 
-impl Taken {
+impl TakenRig {
     /// Runs the hook `before` and switches the power on.
     pub(super) fn begin(rig: &Rig, lock: Option<RigLock>) -> Result<Self, SessionError> {
         let around = Around::begin(rig).map_err(|error| SessionError::Hook {
@@ -26,7 +26,7 @@ impl Taken {
 }
 
 /// Takes a rig. A simulated one needs no lock.
-pub(super) fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
+pub(super) fn take(rig: &Rig, options: &UseOptions) -> Result<TakenRig, SessionError> {
     let forbidden = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
         rig: rig.id().to_owned(),
         since: quarantine.since.clone(),
@@ -47,7 +47,7 @@ pub(super) fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionErro
         options.unless_interrupted(rig)?;
         Some(lock?)
     };
-    let taken = Taken::begin(rig, lock)?;
+    let taken = TakenRig::begin(rig, lock)?;
     options.unless_interrupted(rig)?;
     Ok(taken)
 }

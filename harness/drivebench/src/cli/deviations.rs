@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 /// All of them, for tools.
 #[derive(Serialize)]
-struct Table {
+struct DeviationTable {
     schema: u8,
     deviations: Vec<DeviationRow>,
     masters: Vec<DeviationRow>,
@@ -59,7 +59,7 @@ pub(crate) fn deviations(
             }
         }
         TableFormat::Json => {
-            text = serde_json::to_string(&Table {
+            text = serde_json::to_string(&DeviationTable {
                 schema: 1,
                 deviations: rows,
                 masters,

@@ -5,7 +5,7 @@ use super::trace::{fits_bus, fits_output, show};
 use crate::bus_name::BusName;
 use crate::buses::{carrier, carrying, named, report_of};
 use crate::capture::{
-    Capture, CaptureError, Carries, Imported, JudgeOptions, JudgedCapture, ReadSettings,
+    Capture, CaptureError, Carries, ImportedCapture, JudgeOptions, JudgedCapture, ReadSettings,
     is_capture, read_files,
 };
 use crate::command::exit::Exit;
@@ -103,7 +103,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
 /// Reports what came of judging a capture, of which a part may be missing.
 fn tell(
     judged: &JudgedCapture,
-    imported: &Imported,
+    imported: &ImportedCapture,
     title: &str,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -138,7 +138,11 @@ fn nothing(title: &str, output: &mut Output) -> std::io::Result<Exit> {
 }
 
 /// Reads the files of a capture, and says what was found and not read in them.
-fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> Option<Imported> {
+fn read(
+    paths: &[PathBuf],
+    reading: &ReadingArguments,
+    output: &mut Output,
+) -> Option<ImportedCapture> {
     let settings = ReadSettings {
         rate: reading.line,
         uart: match reading.uart {

@@ -6,7 +6,7 @@ use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::counted::counted;
 use crate::library::Entry;
 use crate::link::LinkEvent;
-use crate::rig::{Again as Retries, Attempt, PlayedScenario, Rig, attempts_of};
+use crate::rig::{Attempt, PlayedScenario, RetryRule, Rig, attempts_of};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -24,7 +24,7 @@ pub(super) fn differences(
     let mut settling = Settling {
         opened,
         texts,
-        retries: Retries::new(opened.header.tolerance),
+        retries: RetryRule::new(opened.header.tolerance),
         wrong: Vec::new(),
         verdicts: Vec::new(),
     };
@@ -48,7 +48,7 @@ pub(super) fn differences(
 struct Settling<'s> {
     opened: &'s OpenedFolder,
     texts: Texts<'s>,
-    retries: Retries,
+    retries: RetryRule,
     wrong: Vec<String>,
     verdicts: Vec<String>,
 }

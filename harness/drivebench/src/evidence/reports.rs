@@ -11,7 +11,7 @@ use super::record::RecordLine;
 use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::capture::read;
 use crate::link::{LinkEvent, PlacedFault};
-use crate::medium::Heard;
+use crate::medium::HeardPiece;
 use harness_proto::can;
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
@@ -175,7 +175,7 @@ fn frames_differ(recorded: &Recorded, traces: &[Trace], looks: bool) -> Option<S
     for event in played(recorded) {
         match event {
             LinkEvent::Sent(_, _, pieces) => sent.extend(pieces.as_out().frames().iter().copied()),
-            LinkEvent::Received(_, at, Heard::Frame(can::CanEvent::Frame(frame))) => {
+            LinkEvent::Received(_, at, HeardPiece::Frame(can::CanEvent::Frame(frame))) => {
                 received.push((at.since_start().as_nanos(), *frame));
             }
             _ => {}

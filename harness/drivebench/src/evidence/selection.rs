@@ -7,7 +7,7 @@ use crate::rig::playing::RecordJudge;
 
 /// How the scenarios of a record compare with those that were to be played.
 #[derive(Debug, Default)]
-pub(super) struct Selection {
+pub(super) struct SelectionCheck {
     /// What contradicts the first line, in sentences.
     pub(super) wrong: Vec<String>,
     /// Why it is not known that all of them were played.
@@ -15,8 +15,8 @@ pub(super) struct Selection {
 }
 
 /// Compares the lines `case` with the selection in the first line.
-pub(super) fn compare(opened: &OpenedFolder) -> Selection {
-    let mut selection = Selection::default();
+pub(super) fn compare(opened: &OpenedFolder) -> SelectionCheck {
+    let mut selection = SelectionCheck::default();
     let header = &opened.header;
     let Some(selected) = &header.selected else {
         selection.missing =

@@ -166,7 +166,7 @@ impl Coverage {
         inputs.sort();
         let mut files = Vec::new();
         let mut corpus = Reached::default();
-        let mut tallies: Vec<_> = noting().map(Tally::new).collect();
+        let mut tallies: Vec<_> = noting().map(CoverageTally::new).collect();
         tallies.sort_by_key(|tally| tally.target.name);
         for (name, content) in inputs {
             let target = name.split('/').next().unwrap_or_default();
@@ -191,7 +191,7 @@ impl Coverage {
         }
         Ok(Self {
             files,
-            targets: tallies.iter().filter_map(Tally::sum).collect(),
+            targets: tallies.iter().filter_map(CoverageTally::sum).collect(),
             corpus,
             hardware: hardware(HARDWARE)?,
         })
@@ -313,14 +313,14 @@ impl Coverage {
 }
 
 /// What a target's inputs reach, as far as they have been played.
-struct Tally {
+struct CoverageTally {
     target: Noting,
     inputs: usize,
     bytes: usize,
     reached: BTreeSet<Feature>,
 }
 
-impl Tally {
+impl CoverageTally {
     const fn new(target: Noting) -> Self {
         Self {
             target,

@@ -2,7 +2,7 @@
 
 use harness::evidence::RecordLine as Written;
 use harness::link::{Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay};
-use harness::medium::{Heard, Medium, Out};
+use harness::medium::{HeardPiece, Medium, Out};
 use harness_proto::can::{self, BitRate, CanError, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
@@ -56,10 +56,10 @@ impl Line for Memory {
         self.free
     }
 
-    fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _port: usize) -> Option<(Instant, HeardPiece)> {
         let (at, heard) = *self.answers.front().filter(|(at, _)| *at <= self.now)?;
         self.answers.pop_front();
-        Some((at, Heard::Frame(heard)))
+        Some((at, HeardPiece::Frame(heard)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -110,7 +110,7 @@ fn frames() -> [Frame; 3] {
 }
 
 /// Sends the frames, and waits for what comes.
-fn talk(link: &mut dyn Link) -> Vec<(Instant, Heard)> {
+fn talk(link: &mut dyn Link) -> Vec<(Instant, HeardPiece)> {
     link.begin();
     let left = link.send(0, Out::Frames(&frames()));
     let mut came = Vec::new();
@@ -142,8 +142,8 @@ fn frames_are_carried_recorded_and_played_back() {
     assert_eq!(
         came[..2],
         [
-            (first + ANSWER, Heard::Frame(answer(question.data()))),
-            (second + ANSWER, Heard::Frame(answer(other.data()))),
+            (first + ANSWER, HeardPiece::Frame(answer(question.data()))),
+            (second + ANSWER, HeardPiece::Frame(answer(other.data()))),
         ]
     );
     let no_one = can::CanEvent::Error(CanError::NoAcknowledge);
@@ -152,7 +152,7 @@ fn frames_are_carried_recorded_and_played_back() {
             .iter()
             .map(|(_, heard)| *heard)
             .collect::<Vec<_>>(),
-        [Heard::Frame(no_one)]
+        [HeardPiece::Frame(no_one)]
     );
 
     let written: Vec<_> = events.iter().filter_map(Written::of).collect();

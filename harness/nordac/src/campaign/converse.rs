@@ -79,7 +79,7 @@ pub(super) fn converse(
     telegrams: &Telegrams,
     fault: Option<LineFaultAt>,
 ) -> Option<Conversation<Telegrams>> {
-    let mut desk = Desk::new(telegrams)?;
+    let mut desk = CampaignDesk::new(telegrams)?;
     if let Some(fault) = fault {
         desk.line.inject(fault);
     }
@@ -100,7 +100,7 @@ pub(super) fn converse(
     })
 }
 
-struct Desk {
+struct CampaignDesk {
     line: OctetSegment<Member<Drive>>,
     requests: Requests,
     exchange: Exchange,
@@ -113,7 +113,7 @@ struct Desk {
     log: Vec<MasterPiece<Vec<Received>>>,
 }
 
-impl Desk {
+impl CampaignDesk {
     fn new(telegrams: &Telegrams) -> Option<Self> {
         let ppo = telegrams.ppo;
         let none = Index::default();

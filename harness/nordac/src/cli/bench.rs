@@ -5,7 +5,7 @@ use crate::rig::OfNordac as _;
 use crate::rig::interlock::InverterInterlock;
 use crate::rig::{Session, rate};
 use harness_bench::link::Line;
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::{Instant, Span};
 use std::ops::{Deref, DerefMut};
@@ -62,7 +62,7 @@ impl Line for UnpluggedLine {
         Instant::START
     }
 
-    fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _port: usize) -> Option<(Instant, HeardPiece)> {
         None
     }
 

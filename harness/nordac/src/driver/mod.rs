@@ -23,7 +23,7 @@ use harness_proto::profibus::fdl::BadTelegram;
 use harness_proto::profibus::master::{Requests, SlaveReply};
 use harness_proto::profibus::{Buffer, BusRate};
 use harness_proto::time::{Instant, Span};
-use phy::Wire;
+use phy::MasterLine;
 use profirust::dp::{DpMaster, Peripheral, PeripheralEvent, PeripheralHandle, PeripheralOptions};
 use profirust::fdl::{FdlActiveStation, ParametersBuilder};
 use profirust::{Baudrate, time};
@@ -85,7 +85,7 @@ pub(crate) struct StartReport {
 
 /// The master of a segment.
 pub(crate) struct Driver<'l> {
-    wire: Wire<'l>,
+    wire: MasterLine<'l>,
     station: FdlActiveStation,
     master: DpMaster<'static>,
     slaves: Vec<Slave>,
@@ -109,7 +109,7 @@ impl<'l> Driver<'l> {
     pub(crate) fn new(line: Box<dyn Line + 'l>, options: Options) -> Self {
         let (station, master) = masters(options);
         Self {
-            wire: Wire::new(line, options.timing, MASTER),
+            wire: MasterLine::new(line, options.timing, MASTER),
             station,
             master,
             slaves: Vec::new(),

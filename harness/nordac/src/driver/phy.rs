@@ -6,7 +6,7 @@
 
 use super::error::Error;
 use harness_bench::link::Line;
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::profibus::dp::{Diagnosis, Service};
@@ -76,7 +76,7 @@ impl Timing {
 const LONGEST_REPLY: u64 = 32;
 
 /// A line, and what the master has under way on it.
-pub(super) struct Wire<'l> {
+pub(super) struct MasterLine<'l> {
     line: Box<dyn Line + 'l>,
     timing: Timing,
     master: u8,
@@ -98,7 +98,7 @@ pub(super) struct Wire<'l> {
     pub(super) not_activated: Option<Service>,
 }
 
-impl<'l> Wire<'l> {
+impl<'l> MasterLine<'l> {
     pub(super) fn new(line: Box<dyn Line + 'l>, timing: Timing, master: u8) -> Self {
         let left = line.now();
         Self {
@@ -126,8 +126,8 @@ impl<'l> Wire<'l> {
     }
 
     /// The wire over another handle of the line.
-    pub(super) fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Wire<'b> {
-        Wire {
+    pub(super) fn onto<'b>(self, line: Box<dyn Line + 'b>) -> MasterLine<'b> {
+        MasterLine {
             line,
             timing: self.timing,
             master: self.master,
@@ -260,7 +260,7 @@ impl<'l> Wire<'l> {
 
     pub(super) fn receive(&mut self) {
         while let Some((_, heard)) = self.line.receive(0) {
-            if let Heard::Octet(octet) = heard {
+            if let HeardPiece::Octet(octet) = heard {
                 self.hear(octet);
             }
         }
@@ -321,7 +321,7 @@ impl<'l> Wire<'l> {
     }
 }
 
-impl ProfibusPhy for Wire<'_> {
+impl ProfibusPhy for MasterLine<'_> {
     fn poll_transmission(&mut self, _now: time::Instant) -> bool {
         self.line.now() < self.left
     }
@@ -397,9 +397,9 @@ mod tests {
             self.now + Span::from_micros(100)
         }
 
-        fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+        fn receive(&mut self, _port: usize) -> Option<(Instant, HeardPiece)> {
             let (at, octet) = self.kept.pop_front_if(|(at, _)| *at <= self.now)?;
-            Some((at, Heard::Octet(Received::good(octet))))
+            Some((at, HeardPiece::Octet(Received::good(octet))))
         }
 
         fn wait(&mut self, until: Instant) -> bool {
@@ -420,7 +420,7 @@ mod tests {
             asked: 0,
             kept: VecDeque::new(),
         };
-        let mut wire = Wire::new(Box::new(slow), timing, 2);
+        let mut wire = MasterLine::new(Box::new(slow), timing, 2);
         let request = Requests::new(2, 8)
             .and_then(|mut requests| requests.request(Service::DataExchange, &[0]));
         let octets = Telegram::Pdu(request.expect("a request")).encode();

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 /// Who has sent a telegram that seems to be of a slave.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Sender {
+pub(super) enum ReplySender {
     /// The slave.
     #[default]
     Known,
@@ -23,7 +23,7 @@ pub(super) enum Sender {
     Nobody,
 }
 
-impl Sender {
+impl ReplySender {
     /// The senders of telegrams that are in order of time.
     pub(super) fn of_all(runs: &[TelegramRun]) -> Vec<Self> {
         let octets = runs

@@ -1,7 +1,7 @@
 //! Follows the telegrams of a line, and judges those of its slaves.
 
 use super::channel::Tasks;
-use super::doubt::Sender;
+use super::doubt::ReplySender;
 use super::follower::{Follower, Record, Way, outputs};
 use super::standing::{Standing, standings};
 use super::symptom::ReplySubject;
@@ -75,7 +75,7 @@ struct HeardRequest {
 #[must_use]
 pub(crate) fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
     let mut runs = runs(trace);
-    let senders = Sender::of_all(&runs);
+    let senders = ReplySender::of_all(&runs);
     // A telegram that the end of the capture has cut.
     let cut = runs.pop_if(|run| run.from.is_some() && is_begun(run));
     let mut judge = Judge {
@@ -134,7 +134,7 @@ fn is_begun(run: &TelegramRun) -> bool {
 
 /// Judges octets that stations sent without a pause, from the first telegram of the line on.
 pub(crate) fn judge_runs(runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
-    Judge::default().all_of(runs.into_iter().map(|run| (run, Sender::Known)))
+    Judge::default().all_of(runs.into_iter().map(|run| (run, ReplySender::Known)))
 }
 
 #[derive(Debug, Default)]
@@ -146,7 +146,7 @@ struct Judge {
     /// The telegrams in front of which the log has gaps.
     gaps: BTreeSet<usize>,
     /// Whether the station that a telegram seems to be of has sent it.
-    sender: Sender,
+    sender: ReplySender,
     followers: BTreeMap<u8, Follower>,
     /// What the telegrams show of each slave if it was switched off and on in its last silence in which a restart fits, and when that
     /// began; until the slave shows that it was not.
@@ -164,7 +164,10 @@ struct Judge {
 }
 
 impl Judge {
-    fn all_of(mut self, runs: impl IntoIterator<Item = (TelegramRun, Sender)>) -> JudgedSlaves {
+    fn all_of(
+        mut self,
+        runs: impl IntoIterator<Item = (TelegramRun, ReplySender)>,
+    ) -> JudgedSlaves {
         for (number, (run, sender)) in (1..).zip(runs) {
             self.sender = sender;
             if self.gaps.contains(&number) {

@@ -92,8 +92,8 @@ fn slave_line(
         Err(problem) => return Some(Err(problem)),
     };
     let what = match line {
-        slave::SlaveLine::Setup(setup) => setup,
-        slave::SlaveLine::Outside(_) => return None,
+        slave::ParsedSlaveLine::Setup(setup) => setup,
+        slave::ParsedSlaveLine::Outside(_) => return None,
     };
     if begun {
         let problem = behind_the_first(word.span, "slave");

@@ -47,7 +47,7 @@ pub(crate) enum SetupKind {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterName {
-    pub(crate) which: Which,
+    pub(crate) which: ParameterChoice,
     /// What stands after it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
     pub(crate) index: Vec<Located>,
     pub(crate) span: TextSpan,
@@ -55,7 +55,7 @@ pub(crate) struct ParameterName {
 
 /// How a parameter is given.
 #[derive(Clone, Debug)]
-pub(crate) enum Which {
+pub(crate) enum ParameterChoice {
     /// `1205`.
     Numbered(u16),
     /// `"Maximum frequ."`: one of the table.

@@ -2,9 +2,9 @@
 
 use super::parse::word_name;
 use super::syntax::{
-    Bad, Damage, Header, JobKind, JobStep, Message, OctetHarm, Outside, ParameterName, Sender,
-    SetupKind, TelegramHarm, TelegramStep, ValueKind, WantedAnswer, Which, WordKind, WordName,
-    WordValue, WrittenValue,
+    Bad, Damage, Header, JobKind, JobStep, Message, OctetHarm, Outside, ParameterChoice,
+    ParameterName, Sender, SetupKind, TelegramHarm, TelegramStep, ValueKind, WantedAnswer,
+    WordKind, WordName, WordValue, WrittenValue,
 };
 use harness_bench::scenario::expression::{Expression, Located};
 use harness_sim::fault::Flips;
@@ -68,9 +68,9 @@ fn counted(number: &Located) -> String {
 /// `1205.3`
 fn parameter(name: &ParameterName) -> String {
     let mut text = match &name.which {
-        Which::Numbered(number) => number.to_string(),
-        Which::Named(parameter) => format!("\"{}\"", parameter.name),
-        Which::Counted(number) => counted(number),
+        ParameterChoice::Numbered(number) => number.to_string(),
+        ParameterChoice::Named(parameter) => format!("\"{}\"", parameter.name),
+        ParameterChoice::Counted(number) => counted(number),
     };
     for part in &name.index {
         text.push('.');

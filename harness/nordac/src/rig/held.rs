@@ -1,6 +1,6 @@
 //! What slaves held before a fuzz run, and what its conversations may have written: put back after each of them.
 
-use super::known::{Known, PPO_TYPE};
+use super::known::{KnownInverters, PPO_TYPE};
 use super::observed::{changes, moves_to};
 use super::player::Player;
 use super::rate;
@@ -30,7 +30,7 @@ impl HeldBefore {
         let mut talk = session.talk();
         let mut all = Vec::new();
         for slave in slaves {
-            let mut known = Known::new(slave);
+            let mut known = KnownInverters::new(slave);
             known.read_all(&mut talk)?;
             all.push(known);
         }

@@ -4,14 +4,14 @@
 //! which is the master's own: it is read before each attempt at a scenario and each command, and by the [driver](super::super::driver)
 //! while time passes in a command. A scenario sends its telegrams itself, so it is not interrupted.
 
-use super::known::Known;
+use super::known::KnownInverters;
 use super::talk::Talk;
 use super::{MASTER, RigSlave};
 use crate::value::{Cell, ReplyWord, cells, percentage};
 use harness_bench::command::cyclic::{Setpoint, setpoint};
 use harness_bench::guard::Watch;
 use harness_bench::link::{Line, Trouble};
-use harness_bench::medium::Heard;
+use harness_bench::medium::HeardPiece;
 use harness_bench::rig::Rig;
 use harness_bench::rig::condition::{Mistake, PortCondition};
 use harness_bench::rig::file::Interlock;
@@ -224,7 +224,7 @@ impl Watch for InverterInterlocks {
             let mut slaves = self.slaves.iter();
             let slave = slaves.find(|slave| slave.address == address);
             let Some(slave) = slave else { continue };
-            let known = Known::new(*slave);
+            let known = KnownInverters::new(*slave);
             talk.restart(interlock.slave);
             let number = match interlock.parameter() {
                 Some(own_parameter) if known.ppo().has_pkw() => {
@@ -259,8 +259,8 @@ impl Watch for InverterInterlocks {
         Ok(())
     }
 
-    fn hear(&mut self, heard: &Heard) -> Result<(), String> {
-        let Heard::Octet(octet) = heard else {
+    fn hear(&mut self, heard: &HeardPiece) -> Result<(), String> {
+        let HeardPiece::Octet(octet) = heard else {
             return Ok(());
         };
         if octet.error.is_some() {

@@ -36,7 +36,7 @@ const LAST_FAULT: u16 = 947;
 
 /// A slave, as far as it is known.
 #[derive(Clone, Debug)]
-pub(super) struct Known {
+pub(super) struct KnownInverters {
     pub(super) slave: RigSlave,
     /// What the parameters read, by number and IND. The notes of all attempts share it.
     pub(super) values: Arc<Values>,
@@ -50,7 +50,7 @@ pub(super) struct Known {
     pub(super) open: Vec<(String, Properties)>,
 }
 
-impl Known {
+impl KnownInverters {
     pub(super) fn new(slave: RigSlave) -> Self {
         Self {
             slave,

@@ -2,7 +2,7 @@
 
 use super::known::{ADDRESS, WIPES};
 use harness_bench::counted::counted;
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::rig::playing::observed::{LinkNotes, ReceivedSum};
 use harness_bench::trouble::Trouble;
 use harness_proto::decode::Decoded;
@@ -261,8 +261,10 @@ impl LinkNotes for TelegramNotes {
         }
     }
 
-    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard) {
-        let Heard::Octet(octet) = heard else { return };
+    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: HeardPiece) {
+        let HeardPiece::Octet(octet) = heard else {
+            return;
+        };
         if self.kept.len() < MOST_KEPT {
             let error = u16::from(octet.error.is_some()) << 8;
             let gap = self
@@ -317,7 +319,7 @@ impl LinkNotes for TelegramNotes {
 #[cfg(test)]
 mod tests {
     use super::{ReceivedOctets, TelegramNotes, WHOLE};
-    use harness_bench::medium::{Heard, Medium};
+    use harness_bench::medium::{HeardPiece, Medium};
     use harness_bench::rig::playing::observed::LinkNotes;
     use harness_proto::line::Received;
     use harness_proto::profibus::BusRate;
@@ -337,7 +339,7 @@ mod tests {
                 break;
             }
             at += Span::from_millis(*gap);
-            notes.heard(medium, at, at, Heard::Octet(Received::good(*octet)));
+            notes.heard(medium, at, at, HeardPiece::Octet(Received::good(*octet)));
         }
         notes
     }

@@ -1,6 +1,6 @@
 //! What the profile of a rig's file says of NORDAC inverters.
 
-use super::known::Known;
+use super::known::KnownInverters;
 use super::talk::TalkError;
 use crate::language::Nordac;
 use crate::language::plan::address;
@@ -40,7 +40,7 @@ impl ProfileSettings {
     ///
     /// # Errors
     /// No value that the slave can have is that of the profile: it is of another slave.
-    pub(super) fn settle(&self, known: &mut Known) -> Result<(), TalkError> {
+    pub(super) fn settle(&self, known: &mut KnownInverters) -> Result<(), TalkError> {
         let slave = known.slave.address;
         for (_, property, word) in self.0.iter().filter(|row| row.0 == slave) {
             let has = |properties: Properties| {
@@ -80,7 +80,7 @@ mod tests {
             address: 8,
             ppo: None,
         };
-        let fresh = Known::new(slave);
+        let fresh = KnownInverters::new(slave);
         for property in PROPERTIES {
             let named = format!("{} = ", property.name);
             let mut open = fresh.open.iter();

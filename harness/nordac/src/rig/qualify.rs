@@ -1,6 +1,6 @@
 //! A qualification of NORDAC inverters: the deviations that explain what they did, and the values of the open points that were settled.
 
-use super::known::{Known, value_of};
+use super::known::{KnownInverters, value_of};
 use super::player::{Player, SlaveNote};
 use super::walk::{State, names, walk_of, walked};
 use super::{RigSlave, limits, slaves};
@@ -203,7 +203,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
 }
 
 /// Settles the properties of a slave of which one value alone explains the conversation that shows it.
-fn settle(slaves: &mut [Known], place: usize, notes: &[&SlaveNote]) {
+fn settle(slaves: &mut [KnownInverters], place: usize, notes: &[&SlaveNote]) {
     let address = slaves[place].slave.address;
     for (name, _, conversation) in NEEDS {
         let property = Description::of(name).filter(|property| !slaves[place].is_settled(property));
@@ -220,7 +220,7 @@ fn settle(slaves: &mut [Known], place: usize, notes: &[&SlaveNote]) {
 }
 
 /// What a slave has shown of each point.
-fn points<'p>(slaves: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
+fn points<'p>(slaves: &'p [KnownInverters], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
     PROPERTIES.iter().flat_map(move |property| {
         slaves.iter().map(move |known| Point {
             drive: format!("slave {}", known.slave.address),

@@ -4,7 +4,7 @@
 //! put back is printed with the command that does it.
 
 use super::RigSlave;
-use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
+use super::known::{ADDRESS, INTERFACE, KnownInverters, PPO_TYPE, WIPES, answer, value};
 use super::observed::WrittenParameter;
 use super::player::{PlayableScenario, Player, idle};
 use super::talk::{Talk, TalkError};
@@ -97,7 +97,7 @@ impl Player {
     /// Says what a scenario is about to write, and which addresses it gives to slaves, with what puts it back. A slave is stopped where it may be
     /// then, with the PPO type that it may have.
     pub(super) fn foretell(&self, begun: &PlayableScenario) {
-        let writes = |known: &Known| {
+        let writes = |known: &KnownInverters| {
             let slave = known.slave;
             let changed = changed(known, &[slave.address], &begun.written);
             let commands = commands(known, slave, &changed, self.left.origin());
@@ -125,7 +125,7 @@ impl Player {
 }
 
 /// Whether a scenario may give a slave another PPO type.
-fn may_switch(known: &Known, begun: &PlayableScenario) -> bool {
+fn may_switch(known: &KnownInverters, begun: &PlayableScenario) -> bool {
     let address = known.slave.address;
     let moved = begun.moved.iter().filter(|change| change.0 == address);
     let places: Vec<_> = moved.map(|change| change.1).chain([address]).collect();
@@ -134,7 +134,11 @@ fn may_switch(known: &Known, begun: &PlayableScenario) -> bool {
 }
 
 /// What may have been `written` to a slave that was at these addresses, in the order in which it is put back.
-fn changed(known: &Known, places: &[u8], written: &BTreeSet<WrittenParameter>) -> Vec<Place> {
+fn changed(
+    known: &KnownInverters,
+    places: &[u8],
+    written: &BTreeSet<WrittenParameter>,
+) -> Vec<Place> {
     let written: Vec<_> = written
         .iter()
         .filter(|write| places.contains(&write.0))
@@ -153,7 +157,7 @@ fn changed(known: &Known, places: &[u8], written: &BTreeSet<WrittenParameter>) -
 }
 
 /// The end of a sentence: the commands that put parameters back; nothing for none.
-fn commands(known: &Known, at: RigSlave, places: &[Place], origin: &str) -> String {
+fn commands(known: &KnownInverters, at: RigSlave, places: &[Place], origin: &str) -> String {
     let one = |place: &Place| {
         let raw = known.values.get(place)?;
         let parameter = Parameter::of(place.0)?;
@@ -181,7 +185,7 @@ fn commands(known: &Known, at: RigSlave, places: &[Place], origin: &str) -> Stri
 /// A slave that is put back.
 struct Restoration<'k, 'l> {
     talk: Talk<'l>,
-    known: &'k Known,
+    known: &'k KnownInverters,
     /// Where it is, and its PPO type there.
     slave: RigSlave,
 }
@@ -190,7 +194,7 @@ impl<'k, 'l> Restoration<'k, 'l> {
     fn new<L: Line>(
         line: &'l mut Guarded<L>,
         player: &Player,
-        known: &'k Known,
+        known: &'k KnownInverters,
         slave: RigSlave,
     ) -> Self {
         let talk = Talk::new(Box::new(line), player.patience());

@@ -3,7 +3,7 @@
 //! The same conversation is held with the slave and with models of it, one for every value of every open point. A value under which the model's
 //! replies differ from those of the slave is excluded. Nothing that is sent enables the motor or writes a parameter.
 
-use super::known::{Known, candidates};
+use super::known::{KnownInverters, candidates};
 use super::observed::{Agreement, WHOLE};
 use super::talk::{Talk, TalkError};
 use harness_proto::nordac::properties::{Description, Properties};
@@ -63,7 +63,7 @@ const ANSWERED: usize = 6;
 ///
 /// # Errors
 /// The line is in trouble, or the slave does not get into the exchange.
-pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<u16, TalkError> {
+pub(super) fn forget(known: &KnownInverters, talk: &mut Talk<'_>) -> Result<u16, TalkError> {
     let (slave, ppo) = (known.slave.address, known.ppo());
     talk.restart(slave);
     talk.start(slave, ppo, Some(FORGET))?;
@@ -76,7 +76,7 @@ pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<u16, TalkErro
 ///
 /// # Errors
 /// The line is in trouble, or the slave does not get into the exchange.
-pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkError> {
+pub(super) fn converse(known: &KnownInverters, talk: &mut Talk<'_>) -> Result<(), TalkError> {
     let (slave, ppo) = (known.slave.address, known.ppo());
     let mut early = SetPrm::lock(IDENT);
     let user = [0x00];

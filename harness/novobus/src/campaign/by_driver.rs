@@ -8,7 +8,7 @@ use crate::driver::{Axis, Error, OpenRings, Options};
 use crate::language::plan::PlannedCall;
 use crate::link::SimulatedLink;
 use harness_bench::link::{Line, Link, Moment, Octets, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Event, Job};
@@ -266,7 +266,7 @@ impl Line for RecordingLink {
         self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         self.link.receive(ring)
     }
 

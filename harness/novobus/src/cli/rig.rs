@@ -21,7 +21,7 @@ use harness_bench::command::rig_failure::{exit_of_end, find_any_rig, tell_end, u
 use harness_bench::command::rig_name::{RigName, Use};
 use harness_bench::counted::counted;
 use harness_bench::link::{Line, Link};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::rig::buses::RigBuses;
 use harness_bench::rig::{Rig, UseOptions};
 use harness_bench::scenario::source::Source;
@@ -79,7 +79,7 @@ impl Line for CreatedRings {
         self.link().send(port, what)
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         self.link().receive(port)
     }
 

@@ -3,7 +3,7 @@
 use crate::driver::{Axis, OpenRings, Options};
 use crate::link::SimulatedLink;
 use harness_bench::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
@@ -41,7 +41,7 @@ impl Line for Ahead<'_> {
         self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         self.link.receive(ring)
     }
 

@@ -5,7 +5,7 @@ use harness_bench::counted::counted;
 use harness_bench::guard::{Safe, Standstill, StandstillStep};
 use harness_bench::link::lateness::StoodStill;
 use harness_bench::link::{Lead, Line, Octets, Trouble, wait_keeping};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
@@ -425,7 +425,7 @@ impl Line for OneRing<'_> {
         end
     }
 
-    fn receive(&mut self, _: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _: usize) -> Option<(Instant, HeardPiece)> {
         self.line.receive(self.ring)
     }
 

@@ -234,7 +234,7 @@ mod tests {
     use crate::link::SimulatedLink;
     use crate::simulate;
     use harness_bench::link::{Line, LinkFault, Moment, PlacedFault};
-    use harness_bench::medium::{Heard, Medium, Out};
+    use harness_bench::medium::{HeardPiece, Medium, Out};
     use harness_bench::scenario::source::Source;
     use harness_proto::line::Rate;
     use harness_proto::novobus::guard::Limits;
@@ -338,7 +338,7 @@ mod tests {
             self.link.send(ring, what)
         }
 
-        fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+        fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
             self.link.receive(ring)
         }
 

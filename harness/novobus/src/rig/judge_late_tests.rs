@@ -57,12 +57,12 @@ impl Line for LatePort {
         self.free
     }
 
-    fn receive(&mut self, _: usize) -> Option<(Instant, medium::Heard)> {
+    fn receive(&mut self, _: usize) -> Option<(Instant, medium::HeardPiece)> {
         self.fetch();
         let now = self.now();
         let (at, _) = self.held.front()?;
         let (at, byte) = (*at <= now).then(|| self.held.pop_front()).flatten()?;
-        Some((at, medium::Heard::Octet(byte)))
+        Some((at, medium::HeardPiece::Octet(byte)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

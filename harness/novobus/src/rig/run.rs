@@ -20,7 +20,9 @@ use harness_bench::guard::Guarded;
 use harness_bench::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
-use harness_bench::rig::{Again, Attempt, Keeper, PlayedScenario, Rig, SessionError, attempts_of};
+use harness_bench::rig::{
+    Attempt, Keeper, PlayedScenario, RetryRule, Rig, SessionError, attempts_of,
+};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{
     AtMismatch, ByteDifference, Mismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well,
@@ -46,7 +48,7 @@ pub(crate) struct Run<'s> {
     /// Sign of life for the session's watchdog while the program only computes.
     beats: Option<Arc<AtomicU64>>,
     /// When a scenario is played once more.
-    again: Again,
+    again: RetryRule,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
     /// A scenario that the rig's limits do not permit to its end is skipped, and nothing of it is sent.
@@ -112,7 +114,7 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
-            again: Again::new(tolerance),
+            again: RetryRule::new(tolerance),
             repeats: false,
             played: false,
             as_they_are: false,

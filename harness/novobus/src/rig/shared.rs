@@ -2,7 +2,7 @@
 
 use crate::rig::session::{self, Session};
 use harness_bench::link::{Lead, Line, Trouble};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::rig::End;
 use harness_proto::line::Rate;
 use harness_proto::time::Instant;
@@ -99,7 +99,7 @@ impl Line for SharedLine {
         self.with(Instant::START, |line| line.send(ring, what))
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         self.with(None, |line| line.receive(ring))
     }
 

@@ -1,7 +1,7 @@
 //! A link of which only the bytes at the master can be seen.
 
 use harness_bench::link::{Capability, Line, Link, Moment, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
 use harness_sim::record::Trace;
@@ -19,7 +19,7 @@ impl<L: Link> Line for Blind<L> {
     fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         self.0.send(ring, what)
     }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         self.0.receive(ring)
     }
     fn wait(&mut self, until: Instant) -> bool {

@@ -5,7 +5,7 @@ use crate::language::run::over_bus::play_over_bus;
 use crate::link::SimulatedLink;
 use crate::simulate::bench;
 use harness_bench::link::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::scenario::run::AtMismatch;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
@@ -43,7 +43,7 @@ impl Line for Busy {
         self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         self.link.receive(ring)
     }
 

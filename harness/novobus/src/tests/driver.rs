@@ -6,7 +6,7 @@ use crate::driver::{
 };
 use crate::link::SimulatedLink;
 use harness_bench::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Position, PositionMode};
@@ -161,7 +161,7 @@ impl Line for DamagesReads {
         self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         let (at, mut received) = self.link.receive_octet(ring)?;
         // Its check byte follows.
         if self.heard == [0x82, 0x81, 0x8A, 0xFD] && self.left > 0 {
@@ -173,7 +173,7 @@ impl Line for DamagesReads {
         }
         self.heard.rotate_left(1);
         self.heard[3] = received.byte;
-        Some((at, Heard::Octet(received)))
+        Some((at, HeardPiece::Octet(received)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -544,14 +544,14 @@ impl Line for Hostile {
         self.now + self.byte_time() * what.len() as u64
     }
 
-    fn receive(&mut self, _ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, HeardPiece)> {
         self.waiting = self.waiting.checked_sub(100)?;
         let byte = if self.echo && !self.random().is_multiple_of(50) {
             self.last
         } else {
             self.random().to_le_bytes()[0]
         };
-        Some((self.now, Heard::Octet(Received::good(byte))))
+        Some((self.now, HeardPiece::Octet(Received::good(byte))))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

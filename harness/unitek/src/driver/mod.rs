@@ -9,7 +9,7 @@ pub(crate) use error::Error;
 
 use super::rig::Axis;
 use harness_bench::link::Line;
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
@@ -328,8 +328,8 @@ impl<'l> Driver<'l> {
     fn receive(&mut self) {
         while let Some((at, heard)) = self.line.receive(0) {
             match heard {
-                Heard::Frame(can::CanEvent::Frame(frame)) => self.hear(at, &frame),
-                Heard::Frame(can::CanEvent::Error(_)) | Heard::Octet(_) => {}
+                HeardPiece::Frame(can::CanEvent::Frame(frame)) => self.hear(at, &frame),
+                HeardPiece::Frame(can::CanEvent::Error(_)) | HeardPiece::Octet(_) => {}
             }
         }
     }

@@ -90,7 +90,7 @@ const INPUTS: u32 = status::LIMIT_PLUS | status::LIMIT_MINUS | status::CONTINUOU
 
 /// How a register is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Compared {
+enum Tolerance {
     Bits(u32),
     Near(i64),
     Between(i64, i64),
@@ -258,19 +258,19 @@ impl World {
     }
 
     /// Between which numbers the position error is on the way: what commands the axis is at its destination or lags behind.
-    fn error_on_its_way(&self) -> Option<Compared> {
+    fn error_on_its_way(&self) -> Option<Tolerance> {
         self.way?;
         let [_, destination] = self.places();
         let (least, most) = self.whereabouts();
         let (below, above) = (destination - most, destination - least);
-        Some(Compared::Between(
+        Some(Tolerance::Between(
             below.min(0) - POSITION_BAND,
             above.max(0) + POSITION_BAND,
         ))
     }
 
     /// How a register is compared; `None` if it is not.
-    fn compared(&self, number: u8) -> Option<Compared> {
+    fn compared(&self, number: u8) -> Option<Tolerance> {
         let positions = self.drive().control() == Control::Position;
         // Whether a position is in tolerance where nothing asks for one is our choice.
         let unlike = self.unlike.contains(&number);
@@ -279,9 +279,9 @@ impl World {
         }
         if self.disturbed {
             return match number {
-                ERRORS => Some(Compared::Bits(ERROR_TIME_OUT)),
+                ERRORS => Some(Tolerance::Bits(ERROR_TIME_OUT)),
                 _ if CONSTANT.contains(&number) || number == SCALE || is_parameter(number) => {
-                    Some(Compared::Bits(!0))
+                    Some(Tolerance::Bits(!0))
                 }
                 _ => None,
             };
@@ -290,41 +290,41 @@ impl World {
         let moves = positions && !self.drive().is_homing() && !followed;
         let speed = |way: Way| {
             let (least, most) = way.speeds();
-            Compared::Between(least - SPEED_BAND, most + SPEED_BAND)
+            Tolerance::Between(least - SPEED_BAND, most + SPEED_BAND)
         };
         match number {
             _ if CONSTANT.contains(&number)
                 || LOGIC.contains(&number)
                 || INPUT.contains(&number) =>
             {
-                Some(Compared::Bits(!0))
+                Some(Tolerance::Bits(!0))
             }
             _ if SPEEDS.contains(&number) && !moves => {
-                let near = Compared::Near(SPEED_BAND);
+                let near = Tolerance::Near(SPEED_BAND);
                 Some(self.way.map_or(near, speed))
             }
             _ if CURRENTS.contains(&number) && self.drive().control() == Control::Torque => {
-                Some(Compared::Near(CURRENT_BAND))
+                Some(Tolerance::Near(CURRENT_BAND))
             }
-            SCALE => Some(Compared::Bits(!0)),
-            _ if FUNCTIONS.contains(&number) && !self.called => Some(Compared::Bits(!0)),
-            IO => Some(Compared::Bits(IO_LOGIC)),
+            SCALE => Some(Tolerance::Bits(!0)),
+            _ if FUNCTIONS.contains(&number) && !self.called => Some(Tolerance::Bits(!0)),
+            IO => Some(Tolerance::Bits(IO_LOGIC)),
             POSITION if self.placed && !self.astray => {
                 let (least, most) = self.whereabouts();
-                Some(Compared::Between(least, most))
+                Some(Tolerance::Between(least, most))
             }
             POSITION_ERROR => self.error_on_its_way(),
-            IN_TOLERANCE if self.tolerance_is_certain() => Some(Compared::Bits(!0)),
+            IN_TOLERANCE if self.tolerance_is_certain() => Some(Tolerance::Bits(!0)),
             // The speed alone decides it.
             0xF5 if self.way.is_none() && (self.speed().abs() - 328).abs() > SPEED_BAND => {
-                Some(Compared::Bits(!0))
+                Some(Tolerance::Bits(!0))
             }
-            STATUS => Some(Compared::Bits(match self.tolerance_is_certain() {
+            STATUS => Some(Tolerance::Bits(match self.tolerance_is_certain() {
                 true => PRINTED,
                 false => PRINTED & !status::TOLERANCE,
             })),
-            ERRORS => Some(Compared::Bits(ERRORS_NOT_READY)),
-            _ if is_parameter(number) => Some(Compared::Bits(!0)),
+            ERRORS => Some(Tolerance::Bits(ERRORS_NOT_READY)),
+            _ if is_parameter(number) => Some(Tolerance::Bits(!0)),
             _ => None,
         }
     }
@@ -409,9 +409,11 @@ impl RightDrive for World {
         let known = Register::of(said.register).mask();
         match self.compared(said.register) {
             None => true,
-            Some(Compared::Bits(mask)) => (said.data.bits() ^ came.data.bits()) & mask & known == 0,
-            Some(Compared::Near(band)) => (said.number() - came.number()).abs() <= band,
-            Some(Compared::Between(least, most)) => (least..=most).contains(&came.number()),
+            Some(Tolerance::Bits(mask)) => {
+                (said.data.bits() ^ came.data.bits()) & mask & known == 0
+            }
+            Some(Tolerance::Near(band)) => (said.number() - came.number()).abs() <= band,
+            Some(Tolerance::Between(least, most)) => (least..=most).contains(&came.number()),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::World;
 use super::tests::{of_all, scenarios};
 use crate::language::Unitek;
-use harness_bench::qualify::worlds::{Dialogue, Judged, TimedPiece, judge};
+use harness_bench::qualify::worlds::{Dialogue, TimedPiece, WorldsVerdict, judge};
 use harness_bench::scenario::run::AtMismatch;
 use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
@@ -23,7 +23,7 @@ fn is_disturbed(source: &Source) -> bool {
 }
 
 /// A scenario of one drive played on a simulated one with this line in its header, and judged where each frame may have been this late.
-fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judged<Frame>> {
+fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<WorldsVerdict<Frame>> {
     let with = |line: &str| {
         let text = source
             .text
@@ -99,11 +99,11 @@ fn no_right_drive_is_accused_however_late_its_frames_are() {
         for (line, late) in [("", 0), ("", 2), (&line[..], 10)] {
             let judged = judged(source, line, "", Span::from_millis(late));
             assert!(
-                !matches!(judged, Some(Judged::Wrong(..))),
+                !matches!(judged, Some(WorldsVerdict::Wrong(..))),
                 "{}, {line}{late} ms late: {judged:?}",
                 source.name
             );
-            right += usize::from(judged == Some(Judged::Right));
+            right += usize::from(judged == Some(WorldsVerdict::Right));
         }
     }
     assert!(right > 100, "{right} judged");
@@ -125,7 +125,7 @@ fn is_found(deviation: &str, all: &[Source]) -> bool {
     all.iter().any(|source| {
         let wrong = of_all(source, &format!("deviates {deviation}"));
         let judged = judged(source, "", &wrong, Span::from_millis(2));
-        matches!(judged, Some(Judged::Wrong(..)))
+        matches!(judged, Some(WorldsVerdict::Wrong(..)))
     })
 }
 
@@ -177,7 +177,7 @@ fn an_event_that_never_comes_is_missed() {
         let drive = setup.drives[0].drive(setup.rate, Instant::START);
         judge(vec![World::new(drive, Arc::default(), true)], &talk)
     };
-    assert_eq!(judged(&[(22, "181#400001000000")]), Judged::Right);
-    assert_ne!(judged(&[]), Judged::Right);
-    assert_ne!(judged(&[(300, "181#400001000000")]), Judged::Right);
+    assert_eq!(judged(&[(22, "181#400001000000")]), WorldsVerdict::Right);
+    assert_ne!(judged(&[]), WorldsVerdict::Right);
+    assert_ne!(judged(&[(300, "181#400001000000")]), WorldsVerdict::Right);
 }

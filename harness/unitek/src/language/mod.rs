@@ -7,7 +7,7 @@ mod play;
 pub(crate) mod syntax;
 mod write;
 
-pub(crate) use play::State;
+pub(crate) use play::PlayState;
 pub(crate) use play::written;
 pub(crate) use write::identifier;
 
@@ -48,7 +48,7 @@ impl Language for Unitek {
     type Wanted = WantedFrame;
     type Act = Act;
     type Received = Frame;
-    type State = State;
+    type State = PlayState;
     type Planner = Planner;
 
     fn comment(line: &str) -> Option<usize> {
@@ -108,8 +108,8 @@ impl Language for Unitek {
         1
     }
 
-    fn state(plan: &Plan<Self>, _: &dyn Link) -> State {
-        State::new(plan)
+    fn state(plan: &Plan<Self>, _: &dyn Link) -> PlayState {
+        PlayState::new(plan)
     }
 
     fn begin(runner: &mut Runner<'_, Self>) -> Result<(), Stop> {
@@ -125,7 +125,7 @@ impl Language for Unitek {
         link.send(port, Out::Frames(frames))
     }
 
-    fn fetch(state: &mut State, link: &mut dyn Link, port: usize) -> Option<(Instant, Frame)> {
+    fn fetch(state: &mut PlayState, link: &mut dyn Link, port: usize) -> Option<(Instant, Frame)> {
         state.fetch(link, port)
     }
 

@@ -174,7 +174,7 @@ fn check(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     Ok(FrameStep::Register(drive, register, expect))
 }
 
-impl drive::DriveLine {
+impl drive::ParsedDriveLine {
     /// The header line that it is; `None` if it is a step.
     fn into_setup(self, begun: bool) -> Option<SetupKind> {
         match self {

@@ -26,23 +26,23 @@ const LONGEST: Span = Span::from_millis(10_000);
 
 /// What is kept while a scenario is played.
 #[derive(Debug, Default)]
-pub(crate) struct State {
+pub(crate) struct PlayState {
     /// What the bench last noticed of the bus.
     error: Option<CanError>,
     /// The reply that a `read` waits for: identifier and register.
     awaited: Option<(u16, u8)>,
     reply: Option<(Instant, Reply)>,
-    drivers: BTreeMap<u8, Driver>,
+    drivers: BTreeMap<u8, PlayedMaster>,
     deviation: Option<&'static MasterDeviation>,
 }
 
 #[derive(Debug)]
-struct Driver {
+struct PlayedMaster {
     master: DeviantMaster,
     ended: Vec<(JobId, Outcome)>,
 }
 
-impl Driver {
+impl PlayedMaster {
     /// Fetches what the master reports. True if something of it is no result of a job.
     fn reports(&mut self) -> bool {
         let mut others = false;
@@ -65,7 +65,7 @@ impl Driver {
     }
 }
 
-impl State {
+impl PlayState {
     /// What is kept from the first step on.
     pub(super) fn new(plan: &Plan<Unitek>) -> Self {
         Self {
@@ -348,7 +348,8 @@ fn drive(
     let setup = plan.setup.drives.iter().find(|drive| drive.node == node);
     let (rx, tx) = setup.map_or((0, 0), |drive| drive.identifiers);
     let deviation = runner.own.deviation;
-    let driver = runner.own.drivers.entry(node).or_insert_with(|| Driver {
+    let driver = runner.own.drivers.entry(node);
+    let driver = driver.or_insert_with(|| PlayedMaster {
         master: DeviantMaster::new(rx, tx, Options::default(), deviation),
         ended: Vec::new(),
     });
@@ -425,7 +426,7 @@ fn judge(span: TextSpan, outcome: Outcome, wanted: WantedOutcome) -> Result<(), 
 }
 
 /// Adds what the bench noticed of the bus to a finding.
-pub(super) fn complete(state: &State, finding: &mut Mismatch) {
+pub(super) fn complete(state: &PlayState, finding: &mut Mismatch) {
     if let Some(error) = state.error {
         finding
             .message

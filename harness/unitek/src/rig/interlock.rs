@@ -7,7 +7,7 @@ use super::Axis;
 use crate::value::{bits, register};
 use harness_bench::guard::Watch;
 use harness_bench::link::{Line, Trouble};
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_bench::rig::Rig;
 use harness_bench::rig::condition::{Mistake, PortCondition};
 use harness_bench::rig::file::Interlock;
@@ -99,7 +99,7 @@ pub(super) struct RegisterInterlocks {
     all: Vec<RegisterInterlock>,
     patience: Span,
     /// What came during a look and is for the conversation.
-    unasked: Vec<(Instant, Heard)>,
+    unasked: Vec<(Instant, HeardPiece)>,
 }
 
 #[derive(Debug)]
@@ -209,7 +209,7 @@ impl Watch for RegisterInterlocks {
         }
     }
 
-    fn hear(&mut self, heard: &Heard) -> Result<(), String> {
+    fn hear(&mut self, heard: &HeardPiece) -> Result<(), String> {
         let all = self.all.iter();
         for interlock in all.filter(|cyclic| cyclic.sends_itself && !cyclic.lacks_scale()) {
             if let Some(reply) = interlock.reply(heard, interlock.register.number)
@@ -221,7 +221,7 @@ impl Watch for RegisterInterlocks {
         Ok(())
     }
 
-    fn take_unasked(&mut self) -> Vec<(Instant, Heard)> {
+    fn take_unasked(&mut self) -> Vec<(Instant, HeardPiece)> {
         std::mem::take(&mut self.unasked)
     }
 }
@@ -270,8 +270,8 @@ impl RegisterInterlock {
     }
 
     /// What a piece says of a register of this drive.
-    fn reply(&self, heard: &Heard, register: u8) -> Option<Reply> {
-        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+    fn reply(&self, heard: &HeardPiece, register: u8) -> Option<Reply> {
+        let HeardPiece::Frame(can::CanEvent::Frame(frame)) = heard else {
             return None;
         };
         let reply = Reply::decode(frame, self.axis.tx).ok()?;
@@ -309,7 +309,7 @@ struct RegisterReader<'a, 'l> {
     line: &'a mut (dyn Line + 'l),
     patience: Span,
     tries: u8,
-    unasked: &'a mut Vec<(Instant, Heard)>,
+    unasked: &'a mut Vec<(Instant, HeardPiece)>,
 }
 
 impl RegisterReader<'_, '_> {

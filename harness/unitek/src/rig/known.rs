@@ -28,7 +28,7 @@ const HOMING: [u64; 5] = [0, 100, 1_000, 3_000, 10_000];
 
 /// A drive, as far as it is known.
 #[derive(Clone, Debug)]
-pub(super) struct Known {
+pub(super) struct KnownDrives {
     pub(super) axis: Axis,
     /// What the registers read last.
     pub(super) cells: BTreeMap<u8, u32>,
@@ -46,7 +46,7 @@ pub(super) struct Known {
     pub(super) doubtful: bool,
 }
 
-impl Known {
+impl KnownDrives {
     pub(super) fn new(axis: Axis) -> Self {
         Self {
             axis,

@@ -1,7 +1,7 @@
 //! What is noted of a link to UNITEK drives: what is written, and how fast replies come.
 
 use harness_bench::counted::counted;
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::rig::playing::observed::{LinkNotes, ReceivedSum};
 use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
@@ -244,8 +244,8 @@ impl LinkNotes for FrameNotes {
         }
     }
 
-    fn heard(&mut self, _: Medium, at: Instant, now: Instant, heard: Heard) {
-        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+    fn heard(&mut self, _: Medium, at: Instant, now: Instant, heard: HeardPiece) {
+        let HeardPiece::Frame(can::CanEvent::Frame(frame)) = heard else {
             return;
         };
         self.heard.pieces += 1;
@@ -318,7 +318,7 @@ mod tests {
             notes.sent(Out::Frames(&[frame("201#3DEB00")]), Instant::START);
         };
         let comes = |notes: &mut FrameNotes, text: &str| {
-            let heard = Heard::Frame(can::CanEvent::Frame(frame(text)));
+            let heard = HeardPiece::Frame(can::CanEvent::Frame(frame(text)));
             notes.heard(Medium::Frames(can::BitRate::K500), at(&1), at(&1), heard);
         };
         asks(&mut notes);
@@ -337,7 +337,7 @@ mod tests {
         for asked in [0, 20] {
             notes.sent(Out::Frames(&[frame("201#3DEB00")]), at(&asked));
         }
-        let heard = Heard::Frame(can::CanEvent::Frame(frame("181#EB102700")));
+        let heard = HeardPiece::Frame(can::CanEvent::Frame(frame("181#EB102700")));
         notes.heard(Medium::Frames(can::BitRate::K500), at(&30), at(&30), heard);
         assert_eq!(notes.longest, Span::from_millis(30));
     }

@@ -3,11 +3,11 @@
 //! They need no permission: reads, cycles, STATUS_MASK (52) and the lock. What they do not settle stays open, and a scenario that depends
 //! on it accuses no drive.
 
-use super::known::{FIRMWARE, Known};
+use super::known::{FIRMWARE, KnownDrives};
 use super::observed::Observed;
 use crate::driver::{Driver, Error};
 use harness_bench::link::{Line, Link as _};
-use harness_bench::medium::{Heard, Out};
+use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
@@ -65,7 +65,7 @@ const TRIES: usize = 3;
 /// # Errors
 /// The link is in trouble, or the drive does not answer.
 pub(super) fn settle(
-    known: &mut Known,
+    known: &mut KnownDrives,
     link: &mut Observed<'_>,
     patience: Span,
 ) -> Result<(), Error> {
@@ -97,7 +97,7 @@ pub(super) fn settle(
 /// # Errors
 /// As [`settle`].
 pub(super) fn settle_within(
-    known: &mut Known,
+    known: &mut KnownDrives,
     link: &mut Observed<'_>,
     patience: Span,
     rate: BitRate,
@@ -147,7 +147,7 @@ fn is_negative(register: u8, bits: u32) -> bool {
 }
 
 struct Probe<'p, 'l> {
-    known: &'p mut Known,
+    known: &'p mut KnownDrives,
     link: &'p mut Observed<'l>,
     patience: Span,
 }
@@ -210,7 +210,7 @@ impl Probe<'_, '_> {
         let mut heard = Vec::new();
         loop {
             while let Some((at, piece)) = self.link.receive(0) {
-                if let Heard::Frame(can::CanEvent::Frame(frame)) = piece
+                if let HeardPiece::Frame(can::CanEvent::Frame(frame)) = piece
                     && let Ok(reply) = Reply::decode(&frame, self.known.axis.tx)
                 {
                     heard.push((at, reply));

@@ -1,6 +1,6 @@
 //! What the profile of a rig's file says of UNITEK drives.
 
-use super::known::Known;
+use super::known::KnownDrives;
 use crate::driver::Error;
 use crate::language::Unitek;
 use crate::language::plan::{node, octet_time};
@@ -41,7 +41,7 @@ impl ProfileSettings {
     ///
     /// # Errors
     /// The drive has shown another value: the profile is of another drive. How long something takes is not compared.
-    pub(super) fn settle(&self, known: &mut Known, rate: BitRate) -> Result<(), Error> {
+    pub(super) fn settle(&self, known: &mut KnownDrives, rate: BitRate) -> Result<(), Error> {
         let stated = self.0.iter().filter(|line| line.0 == known.axis.node);
         for (drive, property, value) in stated {
             let setting = match value {

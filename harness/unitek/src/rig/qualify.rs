@@ -1,7 +1,7 @@
 //! A qualification of UNITEK drives: the deviations that explain what they did, and the values of the open points that were settled.
 
 use super::Axis;
-use super::known::Known;
+use super::known::KnownDrives;
 use super::player::{DriveNote, Player};
 use super::walk::{State, names, walk_of, walked};
 use super::{axes, limits};
@@ -222,7 +222,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
 }
 
 /// Settles the properties of a drive of which one value alone explains the conversation that shows it.
-fn settle(drives: &mut [Known], place: usize, notes: &[&DriveNote]) {
+fn settle(drives: &mut [KnownDrives], place: usize, notes: &[&DriveNote]) {
     let drive = &mut drives[place];
     for (name, _, conversation) in NEEDS {
         let property = Description::of(name).filter(|_| !drive.settled.contains(name));
@@ -244,7 +244,7 @@ fn settle(drives: &mut [Known], place: usize, notes: &[&DriveNote]) {
 }
 
 /// What each drive has shown of each point.
-fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
+fn points<'p>(drives: &'p [KnownDrives], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
     PROPERTIES.iter().flat_map(move |property| {
         drives.iter().map(move |known| Point {
             drive: format!("drive {}", known.axis.node),

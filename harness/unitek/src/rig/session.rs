@@ -9,7 +9,7 @@ use crate::safe_state::{last_words, safe_state};
 use crate::simulate::Bench;
 use harness_bench::guard::{Guarded, Safe, Standstill, Watch};
 use harness_bench::link::frames::{AdapterError, AdapterSettings, FrameLink};
-use harness_bench::medium::{Heard, Pieces};
+use harness_bench::medium::{HeardPiece, Pieces};
 use harness_bench::rig::lock::PortLock;
 use harness_bench::rig::port_file::Port;
 use harness_bench::rig::session::{
@@ -106,7 +106,7 @@ fn listen(session: &mut Session) -> Result<(), SessionError> {
     let axes = session.axes().to_vec();
     let mut other = None;
     session.listen(|heard| {
-        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+        let HeardPiece::Frame(can::CanEvent::Frame(frame)) = heard else {
             return;
         };
         let number = frame.id().number();

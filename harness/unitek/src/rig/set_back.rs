@@ -1,7 +1,7 @@
 //! What a scenario or a probe has left of its own in drives: set back after it, and read. What cannot be set back is said, with the command
 //! that does it.
 
-use super::known::Known;
+use super::known::KnownDrives;
 use super::observed::{FrameNotes, GivenIdentifier, WrittenRegisters};
 use super::{Axis, Session};
 use crate::driver::{Driver, Error};
@@ -54,7 +54,7 @@ const SCANS: Span = Span::from_millis(5);
 /// What drives held before conversations, and what those may have written.
 #[derive(Debug)]
 pub(crate) struct HeldBefore {
-    drives: Vec<Known>,
+    drives: Vec<KnownDrives>,
     notes: FrameNotes,
 }
 
@@ -68,7 +68,7 @@ impl HeldBefore {
         let mut driver = session.driver();
         let mut drives = Vec::new();
         for axis in axes {
-            let mut known = Known::new(axis);
+            let mut known = KnownDrives::new(axis);
             known.read_all(&mut driver)?;
             drives.push(known);
         }
@@ -114,7 +114,7 @@ impl HeldBefore {
 /// may have been stored. Returns what is left to say.
 pub(super) fn set_back(
     session: &mut Session,
-    drives: &[Known],
+    drives: &[KnownDrives],
     written: &WrittenRegisters,
     stored: &BTreeSet<(u16, u16)>,
 ) -> Vec<String> {
@@ -160,12 +160,12 @@ pub(super) fn set_back(
 /// these identifiers too.
 pub(super) fn foretell(
     left: &NotPutBack,
-    drives: &[Known],
+    drives: &[KnownDrives],
     written: &WrittenRegisters,
     given: &[GivenIdentifier],
 ) {
     let origin = left.origin();
-    let of_drive = |known: &Known| {
+    let of_drive = |known: &KnownDrives| {
         let mut before = held_before(known, written);
         let has = |register| before.iter().any(|cell: &(u8, u32)| cell.0 == register);
         let node = known.axis.node;
@@ -229,7 +229,7 @@ fn moved(axis: Axis, given: &[GivenIdentifier], origin: &str) -> Option<String> 
 }
 
 /// What the registers held at first that may have been written, CAN_TIMEOUT before the others.
-fn held_before(known: &Known, written: &WrittenRegisters) -> Vec<(u8, u32)> {
+fn held_before(known: &KnownDrives, written: &WrittenRegisters) -> Vec<(u8, u32)> {
     let written = |register| written.contains(&(known.axis.rx, register));
     // 83 has loaded all parameters.
     let all = written(0x83);
@@ -278,7 +278,7 @@ impl SetBack<'_, '_> {
     /// Sets registers back that may have been written.
     fn registers(
         &mut self,
-        known: &Known,
+        known: &KnownDrives,
         written: &WrittenRegisters,
     ) -> Result<Vec<String>, Error> {
         let mut notes = Vec::new();
@@ -289,7 +289,7 @@ impl SetBack<'_, '_> {
     }
 
     /// Whether the settings of the bus read as they did at first.
-    fn moved_back(&mut self, known: &Known) -> Result<bool, Error> {
+    fn moved_back(&mut self, known: &KnownDrives) -> Result<bool, Error> {
         for register in BUS_SETTINGS {
             let mask = Register::of(register).mask();
             let reads = self.driver.read(self.axis, register)?.data.bits() & mask;
@@ -349,7 +349,7 @@ impl SetBack<'_, '_> {
 
     /// Clears errors that are latched now and were not at first: by 8E (dump), and where that is not enough for a time-out of the bus, by a
     /// lock and its release with commands 0 [field]. Returns what is left to say.
-    fn errors(&mut self, known: &Known, may_release: bool) -> Result<Option<String>, Error> {
+    fn errors(&mut self, known: &KnownDrives, may_release: bool) -> Result<Option<String>, Error> {
         let Some(before) = known.first.get(&ERROR_MAP) else {
             return Ok(None);
         };

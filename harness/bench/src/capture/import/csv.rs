@@ -5,7 +5,7 @@ use super::super::order::{Counts, Place};
 use super::super::telegrams::{self, LATEST};
 use super::super::{Assembly, Capture, CaptureError, ends, line_byte};
 use super::table::{Table, columns, first_line};
-use super::{Imported, ReadSettings};
+use super::{ImportedCapture, ReadSettings};
 use crate::capture::line_formats;
 use crate::report::pcapng::error_named;
 use crate::report::pcapng_frames::{LOST, MASTER};
@@ -101,7 +101,7 @@ fn station(table: &Table<'_>, column: usize) -> Result<Option<u8>, CaptureError>
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn frames(bytes: &[u8]) -> Result<Imported, CaptureError> {
+pub(super) fn frames(bytes: &[u8]) -> Result<ImportedCapture, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, id, remote, dlc, data, ended] = places(&table, FRAMES)?;
     let mut frames = Vec::new();
@@ -137,7 +137,10 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Imported, CaptureError> {
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
+pub(super) fn telegrams(
+    bytes: &[u8],
+    settings: &ReadSettings,
+) -> Result<ImportedCapture, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, _, data, error] = places(&table, TELEGRAMS)?;
     let given = settings.uart;

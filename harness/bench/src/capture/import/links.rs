@@ -5,7 +5,7 @@ use super::super::{Assembly, CaptureError, ends, line_byte};
 use super::levels::Levels;
 use super::numbers::SignedTime;
 use super::uart::{OctetRead, UartFormat, decode, find};
-use super::{Imported, ReadSettings};
+use super::{ImportedCapture, ReadSettings};
 use crate::capture::line_formats;
 use crate::capture::senders::LineRead;
 use crate::counted::counted;
@@ -299,7 +299,7 @@ pub(super) fn settle(
     channels: Vec<ChannelRead>,
     settings: &ReadSettings,
     mut notes: Vec<String>,
-) -> Result<Imported, CaptureError> {
+) -> Result<ImportedCapture, CaptureError> {
     let chosen = choose(channels, settings, &mut notes)?;
     let of_ring = |line: &LinkChannel| matches!(line.target, ChannelTarget::Link(..));
     let (links, all) = (
@@ -371,7 +371,7 @@ pub(super) fn settle(
             }
         }
         let capture = assemble(stations.into_iter(), all, octet);
-        return Ok(Imported {
+        return Ok(ImportedCapture {
             notes,
             unread,
             ..capture.into()
@@ -390,7 +390,7 @@ pub(super) fn settle(
     }
     let rate = Rate::from_bits_per_second(uart.format.bits_per_second);
     let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
-    Ok(Imported {
+    Ok(ImportedCapture {
         notes,
         ..capture.into()
     })

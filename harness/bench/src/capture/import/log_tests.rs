@@ -2,7 +2,7 @@
 
 use super::super::{frame_diff::frame_diff, read_with};
 use super::tests::settings;
-use super::{Imported, ReadSettings};
+use super::{ImportedCapture, ReadSettings};
 use harness_proto::time::Span;
 
 /// Two reads of register 30 (ex 9), the first one at some time, the others 0.4, 100 and 100.4 ms later.
@@ -203,11 +203,11 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
     ]
 }
 
-fn read(text: &str, links: &[&str]) -> Result<Imported, String> {
+fn read(text: &str, links: &[&str]) -> Result<ImportedCapture, String> {
     read_with(text.as_bytes(), &settings(links)).map_err(|error| error.to_string())
 }
 
-fn shown(imported: &Imported) -> Vec<String> {
+fn shown(imported: &ImportedCapture) -> Vec<String> {
     let frames = imported.capture.traces[0].channels[0].frames().iter();
     frames.map(|frame| frame.frame.to_string()).collect()
 }

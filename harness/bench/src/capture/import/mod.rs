@@ -45,7 +45,7 @@ pub struct ReadSettings {
 
 /// A capture, and what is to be told about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Imported {
+pub struct ImportedCapture {
     pub capture: Capture,
     /// What was found and what was not read, in sentences.
     pub notes: Vec<String>,
@@ -55,7 +55,7 @@ pub struct Imported {
     pub unread: Option<String>,
 }
 
-impl Imported {
+impl ImportedCapture {
     /// A verdict on a capture of which a part may be missing, and why it is another one than `verdict`: what differs does not accuse a drive,
     /// and where a drive may have sent what was not read, nothing passes. Damage that is more than a cable does is no evidence at all.
     pub fn settle(&self, verdict: Verdict) -> (Verdict, Option<String>) {
@@ -75,7 +75,7 @@ impl Imported {
     }
 }
 
-impl From<Capture> for Imported {
+impl From<Capture> for ImportedCapture {
     fn from(capture: Capture) -> Self {
         Self {
             capture,
@@ -93,7 +93,7 @@ type Channels = (Vec<ChannelRead>, Vec<String>);
 #[derive(Clone, Copy)]
 enum Reader {
     /// The file says which links it is of.
-    Whole(fn(&[u8], &ReadSettings) -> Result<Imported, CaptureError>),
+    Whole(fn(&[u8], &ReadSettings) -> Result<ImportedCapture, CaptureError>),
     /// The file has channels.
     Channels(fn(&[u8], &ReadSettings) -> Result<Channels, CaptureError>),
 }
@@ -117,7 +117,7 @@ impl Format {
 const fn whole(
     name: &'static str,
     recognised: fn(&[u8]) -> bool,
-    reader: fn(&[u8], &ReadSettings) -> Result<Imported, CaptureError>,
+    reader: fn(&[u8], &ReadSettings) -> Result<ImportedCapture, CaptureError>,
 ) -> Format {
     let reader = Reader::Whole(reader);
     Format {
@@ -346,7 +346,7 @@ pub(super) fn is_capture(start: &[u8]) -> bool {
 ///
 /// # Errors
 /// [`CaptureError`].
-pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
+pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<ImportedCapture, CaptureError> {
     let bytes = without_mark(bytes);
     let Some(format) = format(bytes) else {
         return Err(foreign(bytes));
@@ -360,7 +360,7 @@ pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Ca
         }
     };
     notes.extend(imported.notes);
-    Ok(Imported { notes, ..imported })
+    Ok(ImportedCapture { notes, ..imported })
 }
 
 /// Reads the files of one capture, each with its name. Files of a format whose parts follow each other are one text; of files with channels, each
@@ -371,7 +371,7 @@ pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Ca
 pub(super) fn read_files(
     mut files: Vec<(String, Vec<u8>)>,
     settings: &ReadSettings,
-) -> Result<Imported, CaptureError> {
+) -> Result<ImportedCapture, CaptureError> {
     if let [(_, bytes)] = files.as_slice() {
         return read(bytes, settings);
     }
@@ -430,7 +430,7 @@ pub(super) fn read_files(
             }
             let imported = read(&all.concat(), settings)?;
             notes.extend(imported.notes);
-            Ok(Imported { notes, ..imported })
+            Ok(ImportedCapture { notes, ..imported })
         }
         Reader::Whole(_) => Err(wrong(format!(
             "several files of {} cannot be joined; one expected",

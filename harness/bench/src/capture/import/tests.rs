@@ -23,7 +23,7 @@ fn with_uart(links: &[&str], uart: &str) -> ReadSettings {
     }
 }
 
-fn imported(file: impl AsRef<[u8]>, settings: &ReadSettings) -> Imported {
+fn imported(file: impl AsRef<[u8]>, settings: &ReadSettings) -> ImportedCapture {
     read_with(file.as_ref(), settings).unwrap_or_else(|error| panic!("{error}"))
 }
 

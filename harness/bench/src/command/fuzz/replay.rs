@@ -1,6 +1,6 @@
 //! Cases that a run has kept, played again.
 
-use super::watch::{Telling, summary};
+use super::watch::{FindingWriter, summary};
 use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
@@ -67,7 +67,7 @@ pub fn play<C: FuzzCase>(
         findings: usize::MAX,
         every: 1,
     };
-    let mut telling = Telling {
+    let mut telling = FindingWriter {
         output,
         folder: None,
         rounds: false,

@@ -1,6 +1,6 @@
 //! A fuzz run: its options, its bounds, and what is said of it.
 
-use super::watch::{Telling, summary};
+use super::watch::{FindingWriter, summary};
 use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
@@ -171,7 +171,7 @@ pub fn explore<C: FuzzCase>(
         output.complain(&error.to_string());
         return Ok(Exit::of_evidence(&error));
     }
-    let mut telling = Telling {
+    let mut telling = FindingWriter {
         output,
         folder: Some(folder.clone()),
         rounds: true,

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// Writes findings to standard output and everything else to standard error.
-pub(crate) struct Telling<'o> {
+pub(crate) struct FindingWriter<'o> {
     pub output: &'o mut Output,
     /// The folder with the files of findings.
     pub folder: Option<PathBuf>,
@@ -24,7 +24,7 @@ pub(crate) struct Telling<'o> {
     pub failed: Option<std::io::Error>,
 }
 
-impl<C: FuzzCase> Watcher<C> for Telling<'_> {
+impl<C: FuzzCase> Watcher<C> for FindingWriter<'_> {
     fn round(&mut self, round: u64, swarm: &Swarm<C::Spice>) {
         if self.rounds && self.output.progress {
             let names = swarm.names().join(" ");

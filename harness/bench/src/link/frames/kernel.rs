@@ -226,7 +226,7 @@ mod tests {
     use super::*;
     use crate::link::frames::{AdapterPlace, FrameLink};
     use crate::link::{Line as _, PortLink as _};
-    use crate::medium::Heard;
+    use crate::medium::HeardPiece;
     use harness_proto::can::{CanError, CanEvent};
     use std::net::{TcpListener, TcpStream};
     use std::sync::Arc;
@@ -416,7 +416,10 @@ mod tests {
             let lost = link.trouble().expect("trouble").to_string();
             assert!(lost.contains(words), "{lost}");
             let last = std::iter::from_fn(|| link.receive(0)).last();
-            assert_eq!(last.map(|(_, heard)| heard), Some(Heard::Frame(heard())));
+            assert_eq!(
+                last.map(|(_, heard)| heard),
+                Some(HeardPiece::Frame(heard()))
+            );
             assert_eq!(link.take_unplaced(), unplaced);
             link.resume();
             let now = link.now();

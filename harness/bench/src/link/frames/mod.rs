@@ -17,7 +17,7 @@ pub use open::{AdapterError, AdapterPlace, AdapterSettings, Listening};
 
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use crate::port::{LastWords, Switch, wake_on_time};
 use adapter::Event;
 use harness_proto::can::{self, BitRate, CanError, Frame};
@@ -347,13 +347,13 @@ impl Line for FrameLink {
         self.refused
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         if port > 0 {
             return None;
         }
         let (at, heard) = self.received.pop_front()?;
         self.lying = false;
-        Some((at, Heard::Frame(heard)))
+        Some((at, HeardPiece::Frame(heard)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

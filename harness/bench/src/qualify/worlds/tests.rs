@@ -87,7 +87,7 @@ fn ms(millis: u64) -> Instant {
 }
 
 /// What was sent can reach the drive up to 3 ms later, and what came was on the bus up to 1 ms before.
-fn judged(alarm: bool, sent: &[(u64, u8)], came: &[(u64, u8)]) -> Judged<u8> {
+fn judged(alarm: bool, sent: &[(u64, u8)], came: &[(u64, u8)]) -> WorldsVerdict<u8> {
     judged_with(alarm, sent, came, 0)
 }
 
@@ -97,7 +97,7 @@ fn judged_with(
     sent: &[(u64, u8)],
     came: &[(u64, u8)],
     most_lost: usize,
-) -> Judged<u8> {
+) -> WorldsVerdict<u8> {
     let drive = CountingDrive {
         alarm,
         ..CountingDrive::default()
@@ -133,10 +133,10 @@ fn dialogue(sent: &[(u64, u8)], came: &[(u64, u8)], most_lost: usize) -> Dialogu
 fn a_value_is_compared_exactly_where_nothing_moves() {
     assert_eq!(
         judged(false, &[(10, 7), (20, 0)], &[(22, 7)]),
-        Judged::Right
+        WorldsVerdict::Right
     );
     let wrong = judged(false, &[(10, 7), (20, 0)], &[(22, 8)]);
-    assert_eq!(wrong, Judged::Wrong(0, Some(7)));
+    assert_eq!(wrong, WorldsVerdict::Wrong(0, Some(7)));
 }
 
 /// A value that moves is compared between the earliest and the latest start.
@@ -144,10 +144,10 @@ fn a_value_is_compared_exactly_where_nothing_moves() {
 fn a_value_that_moves_is_one_that_the_times_allow() {
     let reads = |number| judged(false, &[(10, 1), (50, 0)], &[(51, number)]);
     for number in [37, 40, 42] {
-        assert_eq!(reads(number), Judged::Right, "{number}");
+        assert_eq!(reads(number), WorldsVerdict::Right, "{number}");
     }
     for number in [25, 55] {
-        assert_ne!(reads(number), Judged::Right, "{number}");
+        assert_ne!(reads(number), WorldsVerdict::Right, "{number}");
     }
     // Two readings are those of one start.
     let both = |second| {
@@ -157,23 +157,26 @@ fn a_value_that_moves_is_one_that_the_times_allow() {
             &[(51, 38), (61, second)],
         )
     };
-    assert_eq!(both(48), Judged::Right);
-    assert_ne!(both(38), Judged::Right);
+    assert_eq!(both(48), WorldsVerdict::Right);
+    assert_ne!(both(38), WorldsVerdict::Right);
 }
 
 /// What a drive says by itself must come, and what it does not say must not.
 #[test]
 fn what_comes_unasked_is_what_a_drive_says_by_itself() {
     let asked = [(10, 1)];
-    assert_eq!(judged(true, &asked, &[(112, 100)]), Judged::Right);
-    assert_eq!(judged(true, &asked, &[]), Judged::Wrong(0, Some(100)));
-    assert_ne!(judged(true, &asked, &[(150, 100)]), Judged::Right);
+    assert_eq!(judged(true, &asked, &[(112, 100)]), WorldsVerdict::Right);
+    assert_eq!(
+        judged(true, &asked, &[]),
+        WorldsVerdict::Wrong(0, Some(100))
+    );
+    assert_ne!(judged(true, &asked, &[(150, 100)]), WorldsVerdict::Right);
     assert_ne!(
         judged(true, &asked, &[(112, 100), (113, 100)]),
-        Judged::Right
+        WorldsVerdict::Right
     );
-    assert_eq!(judged(true, &[(10, 1), (60, 2)], &[]), Judged::Right);
-    assert_eq!(judged(true, &[], &[(10, 0)]), Judged::Wrong(0, None));
+    assert_eq!(judged(true, &[(10, 1), (60, 2)], &[]), WorldsVerdict::Right);
+    assert_eq!(judged(true, &[], &[(10, 0)]), WorldsVerdict::Wrong(0, None));
 }
 
 /// What an adapter has lost explains that something has not come, and not that something else has.
@@ -182,12 +185,12 @@ fn lost_pieces_explain_what_has_not_come() {
     let sent = [(10, 7), (20, 0), (40, 0), (60, 0)];
     let came = |lost: &[(u64, u8)], most| judged_with(false, &sent, lost, most);
     let one = [(22, 7), (62, 7)];
-    assert_ne!(came(&one, 0), Judged::Right);
-    assert_eq!(came(&one, 1), Judged::Right);
-    assert_ne!(came(&one[1..], 1), Judged::Right);
-    assert_eq!(came(&one[1..], 2), Judged::Right);
-    assert_ne!(came(&[(22, 7), (62, 8)], 2), Judged::Right);
-    assert_ne!(came(&[(22, 7), (24, 7)], 2), Judged::Right);
+    assert_ne!(came(&one, 0), WorldsVerdict::Right);
+    assert_eq!(came(&one, 1), WorldsVerdict::Right);
+    assert_ne!(came(&one[1..], 1), WorldsVerdict::Right);
+    assert_eq!(came(&one[1..], 2), WorldsVerdict::Right);
+    assert_ne!(came(&[(22, 7), (62, 8)], 2), WorldsVerdict::Right);
+    assert_ne!(came(&[(22, 7), (24, 7)], 2), WorldsVerdict::Right);
 }
 
 /// A line that loses what was sent, damages what was said, or parts what was sent.
@@ -223,21 +226,27 @@ fn an_answer_is_read_behind_its_question() {
         talk.most_lost = 0;
         judge(vec![CountingDrive::default()], &talk)
     };
-    assert_ne!(judged(&[4, 4]), Judged::Right);
+    assert_ne!(judged(&[4, 4]), WorldsVerdict::Right);
     let one = |asked| {
         let talk = dialogue(&[(10, 7), (11, 0), (12, 8)], &[(12, 7)], 0);
         judge(vec![CountingDrive::default()], &Dialogue { asked, ..talk })
     };
-    assert_eq!(one(vec![2]), Judged::Right);
-    assert_ne!(one(vec![1]), Judged::Right);
+    assert_eq!(one(vec![2]), WorldsVerdict::Right);
+    assert_ne!(one(vec![1]), WorldsVerdict::Right);
 }
 
 /// What came before nothing more is known is compared, although what was sent after it may have been on its way.
 #[test]
 fn what_is_not_known_later_excuses_nothing_before() {
     let sent = [(10, 7), (20, 0), (22, 3), (40, 0)];
-    assert_eq!(judged(false, &sent, &[(22, 8)]), Judged::Wrong(0, Some(7)));
-    assert_eq!(judged(false, &sent, &[(22, 7), (42, 99)]), Judged::Unknown);
+    assert_eq!(
+        judged(false, &sent, &[(22, 8)]),
+        WorldsVerdict::Wrong(0, Some(7))
+    );
+    assert_eq!(
+        judged(false, &sent, &[(22, 7), (42, 99)]),
+        WorldsVerdict::Unknown
+    );
 }
 
 /// Where there are more worlds than are kept, nothing is accused.
@@ -248,10 +257,10 @@ fn too_many_worlds_accuse_nothing() {
         .flat_map(|at| [(at * 7 + 1, 1), (at * 7 + 4, 2)])
         .collect();
     let talk = |number| judged(false, &sent, &[(290, number)]);
-    assert_eq!(talk(200), Judged::TooMany);
+    assert_eq!(talk(200), WorldsVerdict::TooMany);
     // One that has heard each start and its stop at one time has counted nothing: a world is enough to explain that.
     let asked = [&sent[..], &[(285, 0)]].concat();
     let talk = |number| judged(false, &asked, &[(286, number)]);
-    assert_eq!(talk(0), Judged::Right);
-    assert_ne!(talk(250), Judged::Right);
+    assert_eq!(talk(0), WorldsVerdict::Right);
+    assert_ne!(talk(250), WorldsVerdict::Right);
 }

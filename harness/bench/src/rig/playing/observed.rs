@@ -1,7 +1,7 @@
 //! A link that notes how late the computer is, and lets a bus note what is sent and received.
 
 use crate::link::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{HeardPiece, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -15,7 +15,7 @@ pub trait LinkNotes: Default + Send {
     fn sent(&mut self, what: Out<'_>, end: Instant);
 
     /// Something came over this medium at `at`, and was read at `now`.
-    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard);
+    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: HeardPiece);
 
     /// A step of a scenario begins, at this place of its text.
     fn step(&mut self, _place: usize) {}
@@ -149,7 +149,7 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
         self.link.refused()
     }
 
-    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, HeardPiece)> {
         let Some((at, heard)) = self.link.receive(port) else {
             self.noted.quiet(self.looked);
             return None;

@@ -11,7 +11,7 @@ use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
 use crate::rig::session::{RigDrives, RigSession, failed};
 use crate::rig::{
-    Again, Attempt, End, Keeper, PlayedScenario, Rig, SessionError, UseOptions, attempts_of,
+    Attempt, End, Keeper, PlayedScenario, RetryRule, Rig, SessionError, UseOptions, attempts_of,
 };
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
@@ -98,7 +98,7 @@ pub struct PortRun<P: PortPlayer> {
     session: RigSession<P::Drives>,
     options: UseOptions,
     player: P,
-    again: Again,
+    again: RetryRule,
     notes: Vec<String>,
     /// Why nothing more is played.
     over: Option<String>,
@@ -127,7 +127,7 @@ impl<P: PortPlayer> PortRun<P> {
         player.shows_life(session.beats());
         player.tells(session.left().clone());
         Self {
-            again: Again::new(P::segment(session.rig(), options.allow_motion).tolerance),
+            again: RetryRule::new(P::segment(session.rig(), options.allow_motion).tolerance),
             notes: session.left().take_before().into_iter().collect(),
             session,
             player,
@@ -177,7 +177,7 @@ impl<P: PortPlayer> PortRun<P> {
     /// Forgets what is known of the drives: others have used them.
     pub(crate) fn forget_drives(&mut self) {
         let (rig, options) = (self.session.rig(), &self.options);
-        self.again = Again::new(P::segment(rig, options.allow_motion).tolerance);
+        self.again = RetryRule::new(P::segment(rig, options.allow_motion).tolerance);
         self.player = P::new(rig, options.allow_motion, options.ill_as_well);
         self.player.shows_life(self.session.beats());
         self.player.tells(self.session.left().clone());

@@ -264,16 +264,16 @@ impl Tap {
         while let Some((at, heard)) = link.receive(0) {
             let nanos = now.saturating_sub(present.since(at).as_nanos());
             match heard {
-                medium::Heard::Frame(CanEvent::Frame(frame)) => {
+                medium::HeardPiece::Frame(CanEvent::Frame(frame)) => {
                     self.pieces += 1;
                     let lasted = rate.time_of(frame.wire_bits());
                     pieces.push(Piece::Frame(line_frame(nanos, lasted, frame)));
                 }
-                medium::Heard::Frame(CanEvent::Error(error)) => {
+                medium::HeardPiece::Frame(CanEvent::Error(error)) => {
                     self.damaged += 1;
                     pieces.push(Piece::Event(nanos, error_words(error).to_owned()));
                 }
-                medium::Heard::Octet(_) => {}
+                medium::HeardPiece::Octet(_) => {}
             }
         }
         let reports = link.take_reports();

@@ -128,14 +128,14 @@ fn other(line: &str) -> String {
 }
 
 /// The rows of a csv that are read one after another.
-struct Rows<'b> {
+struct CsvRows<'b> {
     reader: Reader<&'b [u8]>,
     names: Vec<String>,
     row: ByteRecord,
     values: usize,
 }
 
-impl<'b> Rows<'b> {
+impl<'b> CsvRows<'b> {
     fn new(bytes: &'b [u8]) -> Result<Self, Fault> {
         let mut reader = ReaderBuilder::new().from_reader(bytes);
         let heads = reader.headers().map_err(|error| fault(&error))?;
@@ -249,7 +249,7 @@ fn named(name: &str) -> Result<(), Fault> {
 
 /// The csv of `watch`: a time in milliseconds, then a column for each cell, its unit in brackets.
 fn watch(bytes: &[u8]) -> Result<Recording, Fault> {
-    let mut rows = Rows::new(bytes)?;
+    let mut rows = CsvRows::new(bytes)?;
     let heads = rows.names.iter().skip(1);
     let mut curves: Vec<_> = heads
         .map(|head| {
@@ -281,7 +281,7 @@ fn watch(bytes: &[u8]) -> Result<Recording, Fault> {
 
 /// The csv of `scope`: a line for each measurement.
 fn scope(bytes: &[u8]) -> Result<Recording, Fault> {
-    let mut rows = Rows::new(bytes)?;
+    let mut rows = CsvRows::new(bytes)?;
     let mut curves: Vec<(String, Curve)> = Vec::new();
     while rows.next()? {
         rows.count()?;

@@ -11,7 +11,7 @@ use harness_proto::nordac::Properties;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
 use harness_sim::nordac::deviation::DEVIATIONS;
 
-pub(super) enum SlaveLine {
+pub(super) enum ParsedSlaveLine {
     /// A header line.
     Setup(SetupKind),
     /// A step.
@@ -42,30 +42,30 @@ const WORDS: [(&str, Word); 8] = [
 ];
 
 /// Reads what stands after `slave`.
-pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Problem> {
+pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, ParsedSlaveLine), Problem> {
     let slave = expression::sum(scanner)?;
     let before = scanner.clone();
     if scanner.at_end() {
-        return Ok((slave, SlaveLine::Setup(there(scanner)?)));
+        return Ok((slave, ParsedSlaveLine::Setup(there(scanner)?)));
     }
     let line = match named(scanner, &WORDS, "what the line says of the slave")? {
         Word::Ppo | Word::Posicon => {
             *scanner = before;
-            SlaveLine::Setup(there(scanner)?)
+            ParsedSlaveLine::Setup(there(scanner)?)
         }
-        Word::Property => SlaveLine::Setup(property(scanner)?),
+        Word::Property => ParsedSlaveLine::Setup(property(scanner)?),
         Word::Parameter => {
             let (name, value) = value::assigned(scanner)?;
-            SlaveLine::Setup(SetupKind::Parameter(name, value))
+            ParsedSlaveLine::Setup(SetupKind::Parameter(name, value))
         }
         Word::Deviates => {
             let known = deviation(scanner, &DEVIATIONS, "a slave", "`slave 8 deviates NAME`")?;
-            SlaveLine::Setup(SetupKind::Deviates(known))
+            ParsedSlaveLine::Setup(SetupKind::Deviates(known))
         }
         Word::Link => {
             let ends = [("lost", false), ("found", true)];
             let found = named(scanner, &ends, "what becomes of the link")?;
-            SlaveLine::Outside(Outside::Link(found))
+            ParsedSlaveLine::Outside(Outside::Link(found))
         }
         Word::Fault => {
             let digit = scanner
@@ -74,9 +74,9 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Pr
             let number = digit.then(|| expression::sum(scanner)).transpose()?;
             let levels = [("on", true), ("off", false)];
             let on = named(scanner, &levels, "whether the cause is there")?;
-            SlaveLine::Outside(Outside::Fault { number, on })
+            ParsedSlaveLine::Outside(Outside::Fault { number, on })
         }
-        Word::Restart => SlaveLine::Outside(Outside::Restart),
+        Word::Restart => ParsedSlaveLine::Outside(Outside::Restart),
     };
     Ok((slave, line))
 }
@@ -86,9 +86,9 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
     let before = scanner.clone();
     let (slave, line) = line(scanner)?;
     match line {
-        SlaveLine::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
+        ParsedSlaveLine::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
         // A time stands in front of it.
-        SlaveLine::Setup(_) => {
+        ParsedSlaveLine::Setup(_) => {
             *scanner = before;
             Err(scanner.unexpected("a slave and what happens to it (link, fault, restart)"))
         }

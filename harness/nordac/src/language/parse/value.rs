@@ -1,6 +1,6 @@
 //! Parameters and their values: `1205.3 = 50.0Hz`, `"Accel. time" = 5s`.
 
-use super::super::syntax::{ParameterName, ValueKind, Which, WrittenValue};
+use super::super::syntax::{ParameterChoice, ParameterName, ValueKind, WrittenValue};
 use harness_bench::scenario::expression::{self, Located};
 use harness_bench::scenario::parse::words::equals;
 use harness_bench::scenario::problem::{Problem, nearest};
@@ -52,11 +52,11 @@ fn part(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     }
 }
 
-fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
+fn which(scanner: &mut Scanner<'_>) -> Result<ParameterChoice, Problem> {
     if scanner.eat("(") {
         let number = expression::sum(scanner)?;
         return match scanner.eat(")") {
-            true => Ok(Which::Counted(number)),
+            true => Ok(ParameterChoice::Counted(number)),
             false => Err(scanner.unexpected("`)`")),
         };
     }
@@ -67,7 +67,7 @@ fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
         if !scanner.eat("\"") {
             return Err(scanner.unexpected("`\"` behind the name of the parameter"));
         }
-        return Parameter::named(name).map(Which::Named).map_err(|_| {
+        return Parameter::named(name).map(ParameterChoice::Named).map_err(|_| {
             let names: Vec<_> = PARAMETERS.iter().map(|parameter| parameter.name).collect();
             *scanner = before;
             let problem = scanner.unexpected("a parameter");
@@ -79,7 +79,7 @@ fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
     }
     let digits = scanner.take_while(|c| c.is_ascii_digit());
     let number = digits.and_then(|digits| digits.value.parse().ok());
-    number.map(Which::Numbered).ok_or_else(|| {
+    number.map(ParameterChoice::Numbered).ok_or_else(|| {
         *scanner = before;
         let problem = scanner.unexpected("a parameter: its number, or its name in quotation marks");
         problem.help("as in 1202 or \"Accel. time\"")

@@ -1,6 +1,8 @@
 //! Parameters, values and words, settled.
 
-use crate::language::syntax::{ParameterName, ValueKind, Which, WordKind, WordValue, WrittenValue};
+use crate::language::syntax::{
+    ParameterChoice, ParameterName, ValueKind, WordKind, WordValue, WrittenValue,
+};
 use harness_bench::scenario::expression::{Located, Scope};
 use harness_bench::scenario::problem::{Problem, TextSpan};
 use harness_bench::scenario::run::outcome::Stop;
@@ -38,9 +40,9 @@ pub(super) fn up_to(number: &Located, most: i64, scope: Scope, what: &str) -> Re
 /// A parameter with its index (3.4.2): set 1 and sub-index 0 where none is given.
 pub(super) fn parameter(name: &ParameterName, scope: Scope) -> Result<PlannedParameter, Problem> {
     let number = match &name.which {
-        Which::Numbered(number) => i64::from(*number),
-        Which::Named(parameter) => parameter.number.into(),
-        Which::Counted(number) => number.value(scope)?,
+        ParameterChoice::Numbered(number) => i64::from(*number),
+        ParameterChoice::Named(parameter) => parameter.number.into(),
+        ParameterChoice::Counted(number) => number.value(scope)?,
     };
     let fits = u16::try_from(number).ok().filter(|number| *number <= 0x7FF);
     let Some(number) = fits else {

@@ -1,7 +1,7 @@
 //! Whether a line that was not met accuses a slave.
 
 use super::note::kind;
-use super::rehearse::Other;
+use super::rehearse::ModelOptions;
 use super::worlds::{Divergence, MOST_LOST, TOO_MANY, right_slaves_send};
 use super::{AttemptEvidence, Player, RigScenario};
 use crate::rig::known::value_of;
@@ -137,9 +137,9 @@ impl Player {
         let Some(finding) = &outcome.finding else {
             return outcome;
         };
-        let other = Other {
+        let other = ModelOptions {
             switches: left.switches,
-            ..Other::default()
+            ..ModelOptions::default()
         };
         let rehearsed = self.rehearse(scenario, &self.limits, other).turns;
         let shown = kinds(turns) == kinds(&rehearsed);
@@ -225,11 +225,11 @@ impl Player {
             open[place].iter().any(|point| point.name == property.name)
         };
         let came = |all: &Assumptions| -> ReceivedOctets {
-            let other = Other {
+            let other = ModelOptions {
                 properties: Some(all),
                 switches: left.switches,
                 came: Some(&left.came),
-                ..Other::default()
+                ..ModelOptions::default()
             };
             self.rehearse(scenario, &self.limits, other).came
         };

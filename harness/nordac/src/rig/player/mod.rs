@@ -19,7 +19,7 @@ pub(super) use ready::idle;
 pub(super) use rehearse::PlayableScenario;
 
 use super::RigSlave;
-use super::known::{INTERFACE, Known};
+use super::known::{INTERFACE, KnownInverters};
 use super::observed::{Observed, ReceivedOctets, Turn, WrittenParameter};
 use super::profile::ProfileSettings;
 use super::settle;
@@ -105,7 +105,7 @@ pub(crate) struct Player {
     /// Slaves can be switched off and on: they are simulated.
     restarts: bool,
     /// Known from the first attempt on.
-    pub(super) known: Option<Vec<Known>>,
+    pub(super) known: Option<Vec<KnownInverters>>,
     /// What the last attempt may have written: station, number and IND.
     pub(super) written: BTreeSet<WrittenParameter>,
     /// Where it says what a scenario changes, before it does.
@@ -115,7 +115,7 @@ pub(crate) struct Player {
     /// What the profile of the rig's file says.
     pub(super) profile: ProfileSettings,
     /// What was found out of the slaves where finding out has failed.
-    partly: Vec<Known>,
+    partly: Vec<KnownInverters>,
     /// What a slave did that no right slave does, before the first scenario: its verdict says so.
     unlike: Option<String>,
     /// The only slave has done what no right slave does: further lines that it does not meet accuse it too.
@@ -191,10 +191,10 @@ impl Player {
     }
 
     /// What is known of the slaves; nothing before the first attempt.
-    pub(super) fn known(&self) -> &[Known] {
+    pub(super) fn known(&self) -> &[KnownInverters] {
         self.known.as_deref().unwrap_or_default()
     }
-    pub(super) fn known_at(&self, address: u8) -> Option<&Known> {
+    pub(super) fn known_at(&self, address: u8) -> Option<&KnownInverters> {
         let mut known = self.known().iter();
         known.find(|known| known.slave.address == address)
     }
@@ -364,7 +364,12 @@ impl Player {
         if self.known.is_some() {
             return Ok(());
         }
-        let mut all: Vec<_> = self.slaves.iter().copied().map(Known::new).collect();
+        let mut all: Vec<_> = self
+            .slaves
+            .iter()
+            .copied()
+            .map(KnownInverters::new)
+            .collect();
         let mut learn = || {
             let each = all.iter_mut();
             let seen = each.map(|known| self.learn_of(known, link));
@@ -445,7 +450,7 @@ impl Player {
     /// Reads a slave, and holds the conversation that settles what the manual leaves open. Returns what came in it.
     fn learn_of(
         &self,
-        known: &mut Known,
+        known: &mut KnownInverters,
         link: &mut Observed<'_>,
     ) -> Result<ReceivedOctets, TalkError> {
         let address = known.slave.address;
@@ -478,7 +483,7 @@ impl Player {
     /// `seen`, its time included or not.
     fn conversed(
         &self,
-        known: &Known,
+        known: &KnownInverters,
         properties: Properties,
         seen: (&ReceivedOctets, bool),
     ) -> ReceivedOctets {

@@ -5,7 +5,7 @@
 
 use super::worlds::{could_send, right_slaves_send};
 use super::{AttemptCourse, Player, RigScenario};
-use crate::rig::known::{INTERFACE, Known, Values, stated};
+use crate::rig::known::{INTERFACE, KnownInverters, Values, stated};
 use crate::rig::observed::{Agreement, Observed, ReceivedOctets, Turn, WHOLE};
 use crate::rig::settle::{Assumptions, search};
 use crate::rig::talk::{Talk, TalkError};
@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// How a slave differs from what is known of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Other {
+pub(crate) enum KnownDifference {
     /// Nothing differs but what is not settled of it: it is right.
     Right,
     /// The slave at this place has a deviation.
@@ -40,7 +40,7 @@ pub(crate) struct SlaveNote {
     /// What was known when it began.
     begun: Player,
     /// What was known of the slaves in it.
-    slaves: Vec<Known>,
+    slaves: Vec<KnownInverters>,
     /// Whether the settings of the bus were switched to those of the scenario.
     switches: bool,
     shown: AttemptShown,
@@ -161,7 +161,7 @@ impl SlaveNote {
     /// The values of a property of the slave at a place with which slaves that are `known` would have shown the same.
     pub(crate) fn explaining(
         &self,
-        known: &[Known],
+        known: &[KnownInverters],
         place: usize,
         property: &Description,
     ) -> Vec<String> {
@@ -170,7 +170,7 @@ impl SlaveNote {
         let explains = |word: &String| {
             let mut all = base.clone();
             property.set(&mut all[place], word)
-                && self.shown_by(Other::Right, &all, &none) == self.shown
+                && self.shown_by(KnownDifference::Right, &all, &none) == self.shown
         };
         let values = crate::rig::values(property).into_iter();
         values.filter(explains).collect()
@@ -186,7 +186,7 @@ impl SlaveNote {
             slave.parameters.extend(stated(held));
             slave.deviation = Some(deviation);
             let mut link = self.begun.model(vec![slave], &self.begun.limits);
-            let mut again = Known::new(known.slave);
+            let mut again = KnownInverters::new(known.slave);
             let mut talk = Talk::new(Box::new(&mut link), self.begun.patience);
             // What was read before an error counts.
             let _partly = again.read_all(&mut talk);
@@ -222,16 +222,16 @@ impl SlaveNote {
 
     /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read; `None` where that was not
     /// compared to its end.
-    fn is_explained_by(&self, other: Other, held: &Values) -> Option<bool> {
+    fn is_explained_by(&self, other: KnownDifference, held: &Values) -> Option<bool> {
         match !self.noted.exact && self.noted.was_ready {
             true => self.could_be_sent_by(other, held),
             false => Some(self.is_shown_by(other, held)),
         }
     }
 
-    fn is_shown_by(&self, other: Other, held: &Values) -> bool {
+    fn is_shown_by(&self, other: KnownDifference, held: &Values) -> bool {
         let base: Assumptions = self.slaves.iter().map(|known| known.properties).collect();
-        if let Other::WrongSlave(..) = other {
+        if let KnownDifference::WrongSlave(..) = other {
             return self.shown_by(other, &base, held) == self.shown;
         }
         // A verdict in virtual time has looked for right slaves that do the same.
@@ -254,14 +254,14 @@ impl SlaveNote {
     }
 
     /// Whether slaves could have sent what came where time is real; `None` where the comparison stays open.
-    fn could_be_sent_by(&self, other: Other, held: &Values) -> Option<bool> {
+    fn could_be_sent_by(&self, other: KnownDifference, held: &Values) -> Option<bool> {
         let (rate, beats) = (self.begun.rate, &self.begun.beats);
         beats.beat();
         let sent = match other {
-            Other::Right => {
+            KnownDifference::Right => {
                 right_slaves_send(&self.slaves, rate, 0, &self.turns, beats).map(|_| ())
             }
-            Other::WrongSlave(place, deviation) => {
+            KnownDifference::WrongSlave(place, deviation) => {
                 let known = self.slaves.iter();
                 let slaves = known.map(|known| known.model(known.properties));
                 let mut slaves: Vec<_> = slaves.collect();
@@ -277,7 +277,12 @@ impl SlaveNote {
     }
 
     /// What the attempt shows on models.
-    fn shown_by(&self, other: Other, properties: &Assumptions, held: &Values) -> AttemptShown {
+    fn shown_by(
+        &self,
+        other: KnownDifference,
+        properties: &Assumptions,
+        held: &Values,
+    ) -> AttemptShown {
         let mut last = self.played_by(other, held, properties, None);
         // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
         if last != self.shown && self.slaves.iter().any(|slave| slave.values.is_empty()) {
@@ -288,7 +293,7 @@ impl SlaveNote {
 
     fn played_by(
         &self,
-        other: Other,
+        other: KnownDifference,
         held: &Values,
         properties: &Assumptions,
         interface: Option<i64>,
@@ -300,7 +305,7 @@ impl SlaveNote {
             let control = Parameter::of(INTERFACE).zip(interface);
             let control = control.map(|(parameter, value)| (parameter, Index::default(), value));
             slave.parameters.extend(control);
-            if let Other::WrongSlave(wrong, deviation) = other {
+            if let KnownDifference::WrongSlave(wrong, deviation) = other {
                 slave.deviation = (wrong == place).then_some(deviation);
                 slave
                     .parameters
@@ -354,11 +359,11 @@ impl Note for SlaveNote {
     }
 
     fn is_right(&self) -> bool {
-        self.is_explained_by(Other::Right, &Values::new()) == Some(true)
+        self.is_explained_by(KnownDifference::Right, &Values::new()) == Some(true)
     }
 
     fn explains(&self, place: usize, deviation: &'static Deviation) -> Option<bool> {
-        let wrong = Other::WrongSlave(place, deviation);
+        let wrong = KnownDifference::WrongSlave(place, deviation);
         let explained = self.is_explained_by(wrong, &Values::new());
         if explained != Some(false) {
             return explained;

@@ -1,7 +1,7 @@
 //! Slaves made ready for a scenario: off, with the parameters of its header, and without a master.
 
 use super::{Player, RigScenario};
-use crate::rig::known::{INTERFACE, Known, PPO_TYPE};
+use crate::rig::known::{INTERFACE, KnownInverters, PPO_TYPE};
 use crate::rig::observed::Observed;
 use crate::rig::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
@@ -87,7 +87,7 @@ impl Player {
                     let known = self.known_at(slave.address);
                     let ppo = match switches {
                         true => slave.ppo,
-                        false => known.map(Known::ppo).unwrap_or_default(),
+                        false => known.map(KnownInverters::ppo).unwrap_or_default(),
                     };
                     if switches {
                         talk.start(slave.address, ppo, None)?;
@@ -153,7 +153,11 @@ pub(in crate::rig) fn idle(slave: u8, ppo: PpoType, talk: &mut Talk<'_>) -> Resu
 }
 
 /// Switches the settings of the bus of a slave to those of a scenario, the PPO type last.
-fn switch(known: &Known, slave: &SlaveSetup, talk: &mut Talk<'_>) -> Result<(), TalkError> {
+fn switch(
+    known: &KnownInverters,
+    slave: &SlaveSetup,
+    talk: &mut Talk<'_>,
+) -> Result<(), TalkError> {
     let mut stated = slave.parameters.iter();
     let stated = stated.any(|(parameter, ..)| parameter.number == INTERFACE);
     // Without a line about it the scenario has the factory setting: the terminals control the inverter.

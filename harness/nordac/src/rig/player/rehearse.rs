@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 
 /// What a model is beside what is known of the slaves.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Other<'o> {
+pub(super) struct ModelOptions<'o> {
     /// The properties of the slaves in place of those that are known.
     pub(super) properties: Option<&'o Assumptions>,
     /// Whether the settings of the bus are switched to those of the scenario.
@@ -91,9 +91,9 @@ impl Player {
         if let Some(why) = other {
             return Err(Why::OtherDrives(why));
         }
-        let with = |switches| Other {
+        let with = |switches| ModelOptions {
             switches,
-            ..Other::default()
+            ..ModelOptions::default()
         };
         let first = self.rehearse_all(scenario, with(false));
         if first.passes() {
@@ -150,7 +150,7 @@ impl Player {
 
     /// Plays a scenario on the model with what was read of the slaves; where they had faults before, with other fault memories too: what these
     /// hold is not known, and a scenario that would show it is not met.
-    fn rehearse_all(&self, scenario: &RigScenario, other: Other<'_>) -> Rehearsal {
+    fn rehearse_all(&self, scenario: &RigScenario, other: ModelOptions<'_>) -> Rehearsal {
         let mut played = self.rehearse(scenario, &self.limits, other);
         let had_faults = self
             .known()
@@ -159,7 +159,7 @@ impl Player {
         for past in PAST_FAULTS.iter().filter(|_| had_faults) {
             if played.passes() {
                 let past = Past::Faults(past);
-                played = self.rehearse(scenario, &self.limits, Other { past, ..other });
+                played = self.rehearse(scenario, &self.limits, ModelOptions { past, ..other });
             }
         }
         played
@@ -180,10 +180,10 @@ impl Player {
         let kept: Vec<_> = kept.collect();
         let past = Past::Nothing;
         let meets = |switches| {
-            let other = Other {
+            let other = ModelOptions {
                 past,
                 switches,
-                ..Other::default()
+                ..ModelOptions::default()
             };
             self.rehearse(scenario, &self.limits, other).passes()
         };
@@ -279,7 +279,7 @@ impl Player {
         &self,
         scenario: &RigScenario,
         limits: &Limits,
-        other: Other<'_>,
+        other: ModelOptions<'_>,
     ) -> Rehearsal {
         let known = self.known().iter().enumerate();
         let slaves = known.map(|(place, known)| {

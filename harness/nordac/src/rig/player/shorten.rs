@@ -3,7 +3,7 @@
 //! What a right slave replies is the same after a part of most waits: its motor has reached its frequency long before. A slave that needs longer
 //! shows it then as well. `run --rig` plays whole waits.
 
-use super::rehearse::Other;
+use super::rehearse::ModelOptions;
 use super::{Player, RigScenario};
 use crate::rig::observed::Turn;
 use harness_bench::scenario::plan::PlannedAction;
@@ -24,9 +24,9 @@ impl Player {
     /// The same scenario with waits that are as long as right slaves need for the same replies.
     pub(super) fn shortened(&self, scenario: &RigScenario, switches: bool) -> RigScenario {
         let played = |shorter: &RigScenario| {
-            let other = Other {
+            let other = ModelOptions {
                 switches,
-                ..Other::default()
+                ..ModelOptions::default()
             };
             let rehearsal = self.rehearse(shorter, &self.limits, other);
             rehearsal.passes().then(|| replies(&rehearsal.turns))

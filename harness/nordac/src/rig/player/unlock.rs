@@ -1,7 +1,7 @@
 //! What in the rig's file would let a scenario be played that is skipped.
 
 use super::{Player, RigScenario};
-use crate::rig::known::{INTERFACE, Known};
+use crate::rig::known::{INTERFACE, KnownInverters};
 use crate::rig::{MASTER, RigSlave};
 use harness_bench::scenario::run::Unlock;
 use harness_proto::limit::LimitSetting;
@@ -130,7 +130,9 @@ impl Player {
                 address,
                 ppo: Some(ppo),
             };
-            let mut known = listed.cloned().unwrap_or_else(|| Known::new(wanted));
+            let mut known = listed
+                .cloned()
+                .unwrap_or_else(|| KnownInverters::new(wanted));
             known.slave = wanted;
             if known.values.is_empty() {
                 Arc::make_mut(&mut known.values).insert((INTERFACE, 0), 2);

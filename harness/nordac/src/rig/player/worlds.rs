@@ -6,11 +6,11 @@
 
 mod line;
 
-use crate::rig::known::Known;
+use crate::rig::known::KnownInverters;
 use crate::rig::observed::{Agreement, Turn, WHOLE};
 use crate::rig::settle::{Assumptions, search};
 use crate::simulate::SlaveSetup;
-use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, TimedPiece, lost};
+use harness_bench::qualify::worlds::{Dialogue, RightDrive as _, TimedPiece, WorldsVerdict, lost};
 use harness_bench::rig::playing::observed::Beats;
 use harness_proto::nordac::properties::Description;
 use harness_proto::profibus::BusRate;
@@ -56,13 +56,13 @@ pub(super) struct Divergence {
 /// # Errors
 /// Where the slaves as they are known differ.
 pub(super) fn right_slaves_send(
-    known: &[Known],
+    known: &[KnownInverters],
     rate: BusRate,
     most_lost: usize,
     turns: &[Turn],
     beats: &Beats,
 ) -> Result<Vec<usize>, Divergence> {
-    let talk = Talk::new(rate, turns, most_lost);
+    let talk = WorldsDialogue::new(rate, turns, most_lost);
     let slaves = |all: &Assumptions| -> Vec<SlaveSetup> {
         let slaves = known.iter().zip(all.iter().copied());
         slaves.map(|(known, open)| known.model(open)).collect()
@@ -106,12 +106,12 @@ pub(super) fn could_send(
     rate: BusRate,
     turns: &[Turn],
 ) -> Result<(), Divergence> {
-    let mut talk = Talk::new(rate, turns, 0);
+    let mut talk = WorldsDialogue::new(rate, turns, 0);
     (talk.talk.most_steps, talk.closely) = (STEPS_OF_A_NAME, false);
     talk.sent_by(slaves, &|| ()).map(|_| ())
 }
 
-struct Talk {
+struct WorldsDialogue {
     /// Times without what the inverters do not keep.
     talk: Dialogue<Piece>,
     /// Whether short scans are tried: what a line has lost excuses, and many deviations are tried for a name.
@@ -122,7 +122,7 @@ struct Talk {
     left: Vec<Instant>,
 }
 
-impl Talk {
+impl WorldsDialogue {
     fn new(rate: BusRate, turns: &[Turn], most_lost: usize) -> Self {
         let sent = turns.iter().enumerate().map(|(number, turn)| TimedPiece {
             // A stream is not as slow as a line.
@@ -189,13 +189,13 @@ impl Talk {
             return Ok(Vec::new());
         }
         let mut found = lost(line, &self.within(CYCLE - LONG), alive);
-        if matches!(found, Err((Judged::Wrong(..), true))) && self.closely {
+        if matches!(found, Err((WorldsVerdict::Wrong(..), true))) && self.closely {
             let line = Line::<SHORT>::new(slaves);
             found = lost(line, &self.within(CYCLE - SHORT), alive);
         }
         let (place, expected) = match found {
             Ok(lost) => return Ok(lost),
-            Err((Judged::Wrong(place, expected), _)) => (Some(place), expected),
+            Err((WorldsVerdict::Wrong(place, expected), _)) => (Some(place), expected),
             Err(_) => (None, None),
         };
         let before = &came[..place.map_or(0, |place| came.len().min(place + 1))];

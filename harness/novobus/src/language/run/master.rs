@@ -6,7 +6,7 @@ use crate::driver::{Axis, Error, OpenRings, Options, conduct, count_drives};
 use crate::language::plan::PlannedCall;
 use crate::language::syntax::Ending;
 use harness_bench::link::{Lead, Line, Octets, Trouble};
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::scenario::pattern::Expected;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::halt::Halt;
@@ -49,9 +49,9 @@ impl Line for Through<'_, '_> {
         end
     }
 
-    fn receive(&mut self, _ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, HeardPiece)> {
         let (at, octet) = self.runner.take_next(self.ring)?;
-        Some((at, Heard::Octet(octet)))
+        Some((at, HeardPiece::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

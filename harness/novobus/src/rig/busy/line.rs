@@ -10,7 +10,7 @@ use harness_bench::link::stamp::stamped;
 use harness_bench::link::{
     Capability, InnerLink, Lead, Line, Link, Moment, Octets, PlacedFault, PortLink,
 };
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -173,10 +173,10 @@ impl Line for BusyLine {
         self.free
     }
 
-    fn receive(&mut self, _: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, _: usize) -> Option<(Instant, HeardPiece)> {
         self.lying = false;
         let (at, octet) = self.received.pop_front()?;
-        Some((at, Heard::Octet(octet)))
+        Some((at, HeardPiece::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

@@ -10,7 +10,7 @@ use crate::simulate::bench;
 use harness_bench::link::{
     Capability, Lead, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
-use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_bench::scenario::run::{AtMismatch, Outcome, play};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
@@ -198,7 +198,7 @@ impl<L: Link> Line for FailingLink<L> {
         self.look();
         end
     }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, HeardPiece)> {
         let byte = self.link.receive(ring)?;
         self.counts[1] += 1;
         self.look();

@@ -12,7 +12,7 @@ use harness_proto::unitek::properties::{Accepts, Description, PROFILES, PROPERTI
 use harness_sim::unitek::deviation::DEVIATIONS;
 use harness_sim::unitek::{Control, Inputs};
 
-pub(super) enum DriveLine {
+pub(super) enum ParsedDriveLine {
     /// A header line.
     Setup(SetupKind),
     /// A header line or a step.
@@ -61,43 +61,45 @@ pub(in super::super) fn mode_word(mode: Control) -> &'static str {
 }
 
 /// Reads what stands after `drive`.
-pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, DriveLine), Problem> {
+pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, ParsedDriveLine), Problem> {
     let drive = expression::sum(scanner)?;
     if scanner.at_end() {
         let there = SetupKind::There { rx: None, tx: None };
-        return Ok((drive, DriveLine::Setup(there)));
+        return Ok((drive, ParsedDriveLine::Setup(there)));
     }
     let before = scanner.clone();
     let line = match named(scanner, &WORDS, "what the line says of the drive")? {
         Word::Rx | Word::Tx => {
             *scanner = before;
-            DriveLine::Setup(identifiers(scanner)?)
+            ParsedDriveLine::Setup(identifiers(scanner)?)
         }
         Word::Profile => {
             let names = PROFILES.map(|name| (name, name));
-            DriveLine::Setup(SetupKind::Profile(named(scanner, &names, "a profile")?))
+            ParsedDriveLine::Setup(SetupKind::Profile(named(scanner, &names, "a profile")?))
         }
-        Word::Property => DriveLine::Setup(property(scanner)?),
-        Word::Mode => DriveLine::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
+        Word::Property => ParsedDriveLine::Setup(property(scanner)?),
+        Word::Mode => {
+            ParsedDriveLine::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?))
+        }
         Word::Deviates => {
             let known = deviation(scanner, &DEVIATIONS, "a drive", "`drive 1 deviates NAME`")?;
-            DriveLine::Setup(SetupKind::Deviates(known))
+            ParsedDriveLine::Setup(SetupKind::Deviates(known))
         }
         Word::Register => {
             let register = value::register(scanner)?;
             equals(scanner)?;
             let value = value::value(scanner, register.unit())?;
-            DriveLine::Outside(Outside::Register(register, value))
+            ParsedDriveLine::Outside(Outside::Register(register, value))
         }
         Word::Input => {
             let names = Inputs::SWITCHES.map(|name| (name, name));
             let input = named(scanner, &names, "an input")?;
             let levels = [("high", true), ("low", false)];
             let level = named(scanner, &levels, "a level")?;
-            DriveLine::Outside(Outside::Input(input, level))
+            ParsedDriveLine::Outside(Outside::Input(input, level))
         }
-        Word::Force => DriveLine::Outside(force(scanner)?),
-        Word::Restart => DriveLine::Restart,
+        Word::Force => ParsedDriveLine::Outside(force(scanner)?),
+        Word::Restart => ParsedDriveLine::Restart,
     };
     Ok((drive, line))
 }
@@ -107,10 +109,10 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     let before = scanner.clone();
     let (drive, line) = line(scanner)?;
     match line {
-        DriveLine::Outside(outside) => Ok(FrameStep::Outside(drive, outside)),
-        DriveLine::Restart => Ok(FrameStep::Outside(drive, Outside::Restart)),
+        ParsedDriveLine::Outside(outside) => Ok(FrameStep::Outside(drive, outside)),
+        ParsedDriveLine::Restart => Ok(FrameStep::Outside(drive, Outside::Restart)),
         // A time stands in front of it.
-        DriveLine::Setup(_) => {
+        ParsedDriveLine::Setup(_) => {
             *scanner = before;
             Err(scanner
                 .unexpected("a drive and what happens to it (input, force, register, restart)"))

@@ -25,7 +25,7 @@ const DRIFT: u64 = 50;
 const MODE: u8 = 0x51;
 const COMMANDS: [u8; 2] = [0x31, 0x90];
 
-struct Cycle {
+struct CountedCycle {
     every: u8,
     /// Where in what was sent its request stands, and the one that stops it.
     begun: usize,
@@ -37,7 +37,7 @@ struct Conversation<'t> {
     sent: Vec<(Instant, Option<Request>)>,
     came: &'t [TimedFrame],
     read: Instant,
-    cycles: BTreeMap<u8, Cycle>,
+    cycles: BTreeMap<u8, CountedCycle>,
 }
 
 impl<'t> Conversation<'t> {
@@ -57,7 +57,7 @@ impl<'t> Conversation<'t> {
                 Some(Request::Cycle { register, every }) => {
                     running += 1;
                     most = most.max(running);
-                    let begun = Cycle {
+                    let begun = CountedCycle {
                         every,
                         begun: place,
                         ended: None,
@@ -117,7 +117,7 @@ impl<'t> Conversation<'t> {
     }
 
     /// The fewest and the most frames of a cycle that a right drive sends.
-    fn bounds(&self, cycle: &Cycle) -> Option<(u64, u64)> {
+    fn bounds(&self, cycle: &CountedCycle) -> Option<(u64, u64)> {
         let every = Span::from_millis(cycle.every.into()).units();
         let ended = cycle.ended?;
         let surely = (self.sent[ended].0 - AHEAD).since(self.confirmed(cycle.begun)?);

@@ -20,7 +20,7 @@ use verdict::{are_judged, explained, unlike};
 use worlds::{AttemptFrames, BESIDE_THE_BUS, Proof, STANDSTILL};
 
 use super::Axis;
-use super::known::Known;
+use super::known::KnownDrives;
 use super::observed::{FrameNotes, Observed, WrittenRegisters};
 use super::profile::ProfileSettings;
 use super::set_back::foretell;
@@ -65,7 +65,7 @@ const STILL_COMES: u64 = 5;
 
 /// What a model is beside what is known of the drives.
 #[derive(Clone, Copy, Default)]
-struct Other {
+struct ModelOptions {
     /// How far the clocks of the drives are ahead.
     phase: Span,
     /// The properties of the drive at a place, in place of those that are known.
@@ -105,9 +105,9 @@ pub(crate) struct Player {
     /// What the rig's file says of the drives, unless they are qualified.
     profile: ProfileSettings,
     /// Known from the first attempt on.
-    known: Option<Vec<Known>>,
+    known: Option<Vec<KnownDrives>>,
     /// What was found out where finding out has failed.
-    partly: Vec<Known>,
+    partly: Vec<KnownDrives>,
     /// What has been written since the registers were read.
     written: WrittenRegisters,
     /// The levels of the EEPROM that the last attempt may have stored, with the drives.
@@ -182,12 +182,12 @@ impl Player {
     }
 
     /// What is known of the drives; nothing before the first attempt.
-    pub(super) fn known(&self) -> &[Known] {
+    pub(super) fn known(&self) -> &[KnownDrives] {
         self.known.as_deref().unwrap_or_default()
     }
 
     /// What was read of the drives, also where not everything could be.
-    pub(super) fn read_so_far(&self) -> &[Known] {
+    pub(super) fn read_so_far(&self) -> &[KnownDrives] {
         self.known.as_deref().unwrap_or(&self.partly)
     }
 
@@ -428,15 +428,15 @@ impl Player {
         if let Some(why) = self.other_properties(&scenario.header) {
             return Err(Why::OtherDrives(why).into());
         }
-        let first = self.rehearse(scenario, &self.limits, Other::default());
+        let first = self.rehearse(scenario, &self.limits, ModelOptions::default());
         if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
             return Ok(first);
         }
         // A drive with other registers than that of the scenario is qualified with it all the same, where right drives are compared.
         if self.qualifies && real && self.limits.motion && scenario.is_foretold() {
-            let whole = Other {
+            let whole = ModelOptions {
                 goes_on: true,
-                ..Other::default()
+                ..ModelOptions::default()
             };
             let whole = self.rehearse(scenario, &self.limits, whole);
             let failed = whole.outcome.verdict == Verdict::Failed;
@@ -446,7 +446,7 @@ impl Player {
         }
         let mut limits = self.limits.clone();
         let mut unlocks = BTreeSet::new();
-        let mut last = self.rehearse(scenario, &limits, Other::default());
+        let mut last = self.rehearse(scenario, &limits, ModelOptions::default());
         for _ in 0..4 {
             let wanted = match &last.denied {
                 Some((_, settings)) => settings.clone(),
@@ -462,7 +462,7 @@ impl Player {
             if limits == before {
                 break;
             }
-            last = self.rehearse(scenario, &limits, Other::default());
+            last = self.rehearse(scenario, &limits, ModelOptions::default());
         }
         let found = |outcome: &Outcome| {
             let finding = outcome.finding.as_ref();
@@ -530,7 +530,7 @@ impl Player {
         })
     }
 
-    fn rehearse(&self, scenario: &RigScenario, limits: &Limits, other: Other) -> Rehearsal {
+    fn rehearse(&self, scenario: &RigScenario, limits: &Limits, other: ModelOptions) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
@@ -573,7 +573,7 @@ impl Player {
     }
 
     /// Tells a model's gate what the gate in front of the drives knows of them.
-    fn tell(&self, drives: &[Known], gate: &mut guard::Gate) {
+    fn tell(&self, drives: &[KnownDrives], gate: &mut guard::Gate) {
         for known in drives {
             let [full, limit] = [0xC8, 0x34].map(|register| (known.cell(register) & 0xFFFF) as u16);
             gate.learn(known.axis.rx, full, limit);

@@ -3,7 +3,7 @@
 //! An attempt is explained by a model that ends it in the same way, at the same line, and sends the same frames. How often a frame is sent and
 //! when is not compared, since the clock of a drive stands anywhere when an attempt begins; lines of scenarios compare that.
 
-use super::super::known::Known;
+use super::super::known::KnownDrives;
 use super::super::observed::Observed;
 use super::worlds::AttemptFrames;
 use super::{AttemptCourse, Player, RigScenario};
@@ -32,7 +32,7 @@ const EACH_PHASE: usize = 8;
 
 /// How a drive differs from what is known of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Other {
+pub(crate) enum KnownDifference {
     /// Nothing differs but what is not settled of it: it is right.
     Right,
     /// The drive at this place has a deviation.
@@ -45,7 +45,7 @@ pub(crate) struct DriveNote {
     /// What was known when it began.
     begun: Player,
     /// What was known of the drives in it.
-    drives: Vec<Known>,
+    drives: Vec<KnownDrives>,
     shown: AttemptShown,
     /// Its frames and their times, where time is real or they alone judge.
     told: Option<AttemptFrames>,
@@ -173,20 +173,20 @@ impl DriveNote {
             if let Some(properties) = all.get_mut(place) {
                 *properties = **value;
             }
-            phases(EACH_PHASE).any(|phase| self.shows(Other::Right, &all, phase, 0))
+            phases(EACH_PHASE).any(|phase| self.shows(KnownDifference::Right, &all, phase, 0))
         };
         values.iter().filter(explains).collect()
     }
 
     /// Whether drives that differ so would have shown the same; `None` where that was not compared to its end. Behind an adapter its frames and
     /// their times alone say it.
-    fn is_explained_by(&self, other: Other) -> Option<bool> {
+    fn is_explained_by(&self, other: KnownDifference) -> Option<bool> {
         let told = match other {
-            Other::Deviates(place, deviation) if self.told.is_some() => {
+            KnownDifference::Deviates(place, deviation) if self.told.is_some() => {
                 self.told_by(place, deviation)
             }
-            Other::Deviates(..) => Some(true),
-            Other::Right => Some(!self.wrong),
+            KnownDifference::Deviates(..) => Some(true),
+            KnownDifference::Right => Some(!self.wrong),
         };
         let by_times = self.told.is_some() && !self.noted.exact;
         match told {
@@ -196,21 +196,21 @@ impl DriveNote {
         }
     }
 
-    fn is_shown_by(&self, other: Other) -> bool {
+    fn is_shown_by(&self, other: KnownDifference) -> bool {
         let known: Vec<_> = self.drives.iter().map(|known| known.properties).collect();
         let each = match other {
-            Other::Right => 1,
-            Other::Deviates(..) => EACH_PHASE,
+            KnownDifference::Right => 1,
+            KnownDifference::Deviates(..) => EACH_PHASE,
         };
         if phases(each).any(|phase| self.shows(other, &known, phase, 0)) {
             return true;
         }
         match other {
-            Other::Deviates(..) => {
+            KnownDifference::Deviates(..) => {
                 let mut heard = HEARD_BEFORE;
                 heard.any(|heard| self.shows(other, &known, Span::ZERO, heard))
             }
-            Other::Right => self.drives.iter().enumerate().any(|(place, drive)| {
+            KnownDifference::Right => self.drives.iter().enumerate().any(|(place, drive)| {
                 drive.candidates().into_iter().any(|properties| {
                     let mut all = known.clone();
                     all[place] = properties;
@@ -221,12 +221,18 @@ impl DriveNote {
     }
 
     /// Plays the attempt on a model, whose clock is ahead and which has heard some requests before.
-    fn shows(&self, other: Other, properties: &[Properties], phase: Span, heard: u8) -> bool {
+    fn shows(
+        &self,
+        other: KnownDifference,
+        properties: &[Properties],
+        phase: Span,
+        heard: u8,
+    ) -> bool {
         let mut player = self.begun.clone();
         player.beats.beat();
         let drives = self.drives.iter().zip(properties).enumerate();
         let drives = drives.map(|(place, (known, properties))| match other {
-            Other::Deviates(deviates, deviation) if deviates == place => {
+            KnownDifference::Deviates(deviates, deviation) if deviates == place => {
                 deviant(known, *properties, deviation)
             }
             _ => right(known, *properties),
@@ -283,11 +289,11 @@ impl Note for DriveNote {
     }
 
     fn is_right(&self) -> bool {
-        self.is_explained_by(Other::Right) == Some(true)
+        self.is_explained_by(KnownDifference::Right) == Some(true)
     }
 
     fn explains(&self, place: usize, deviation: &'static Deviation) -> Option<bool> {
-        self.is_explained_by(Other::Deviates(place, deviation))
+        self.is_explained_by(KnownDifference::Deviates(place, deviation))
     }
 }
 
@@ -301,7 +307,7 @@ pub(super) fn phases(each: usize) -> impl Iterator<Item = Span> {
 }
 
 /// A drive as it is known; as delivered where nothing was read of it.
-fn right(known: &Known, properties: Properties) -> DriveSetup {
+fn right(known: &KnownDrives, properties: Properties) -> DriveSetup {
     match known.cells.is_empty() {
         true => DriveSetup {
             identifiers: (known.axis.rx, known.axis.tx),
@@ -312,7 +318,11 @@ fn right(known: &Known, properties: Properties) -> DriveSetup {
 }
 
 /// A drive with a deviation, whose registers hold what makes it send what was read of it.
-fn deviant(known: &Known, properties: Properties, deviation: &'static Deviation) -> DriveSetup {
+fn deviant(
+    known: &KnownDrives,
+    properties: Properties,
+    deviation: &'static Deviation,
+) -> DriveSetup {
     let mut guess = known.clone();
     // What a correct drive works out from others is left as it is.
     let usual = read(known, right(known, properties));
@@ -340,7 +350,7 @@ fn deviant(known: &Known, properties: Properties, deviation: &'static Deviation)
 }
 
 /// What the registers of a simulated drive read.
-fn read(known: &Known, setup: DriveSetup) -> BTreeMap<u8, u32> {
+fn read(known: &KnownDrives, setup: DriveSetup) -> BTreeMap<u8, u32> {
     let setup = simulate::Setup {
         drives: vec![setup],
         ..simulate::Setup::of(1)

@@ -1,7 +1,7 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
 use super::worlds::{AttemptFrames, Proof};
-use super::{Known, Player, RigScenario};
+use super::{KnownDrives, Player, RigScenario};
 use crate::BUSES;
 use crate::rig::Axis;
 use crate::rig::observed::Exchange;
@@ -189,7 +189,7 @@ fn drives_with_other_registers_are_qualified_with_the_scenarios_of_the_dump() {
     let scenario = RigScenario::read(&source).expect("a scenario");
     let rehearsed = |qualifies, real| {
         let mut player = Player::new(&rig, true, qualifies);
-        let mut known = Known::new(player.axes[0]);
+        let mut known = KnownDrives::new(player.axes[0]);
         let dump = REGISTERS.iter().map(|row| (row.number, row.dump));
         known.cells = dump.collect();
         known.cells.insert(0xD9, 0x0200);
@@ -284,7 +284,7 @@ fn what_is_lost_each_time_accuses() {
 fn what_comes_after_a_standstill_accuses_no_drive_at_once() {
     let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
     let mut player = Player::new(&rig, true, true);
-    let mut known = Known::new(player.axes[0]);
+    let mut known = KnownDrives::new(player.axes[0]);
     known.cells = REGISTERS.iter().map(|row| (row.number, row.dump)).collect();
     player.known = Some(vec![known]);
     let at = |millis| Instant::START + Span::from_millis(millis);

@@ -1,6 +1,6 @@
 //! What is found out about drives before a scenario, and how they are made ready for it.
 
-use super::super::known::Known;
+use super::super::known::KnownDrives;
 use super::super::observed::Observed;
 use super::super::probe;
 use super::super::qualify::free;
@@ -28,9 +28,9 @@ impl Player {
             None => {
                 let again = self.axes.iter().map(|axis| {
                     let partly = self.partly.iter().find(|known| known.axis == *axis);
-                    Known {
+                    KnownDrives {
                         first: partly.map(|known| known.first.clone()).unwrap_or_default(),
-                        ..Known::new(*axis)
+                        ..KnownDrives::new(*axis)
                     }
                 });
                 again.collect()
@@ -50,12 +50,12 @@ impl Player {
     }
 
     /// Reads and probes one drive.
-    fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<(), Error> {
+    fn learn_of(&self, known: &mut KnownDrives, link: &mut Observed<'_>) -> Result<(), Error> {
         let axes = [known.axis];
         if known.doubtful {
-            *known = Known {
+            *known = KnownDrives {
                 first: std::mem::take(&mut known.first),
-                ..Known::new(known.axis)
+                ..KnownDrives::new(known.axis)
             };
         }
         let tolerance = link.time_tolerance();

@@ -1,6 +1,6 @@
 //! A scenario of this bus, read for a rig.
 
-use super::{AT_REST, Known};
+use super::{AT_REST, KnownDrives};
 use crate::language::Unitek;
 use crate::language::plan::{Act, WantedFrame, WantedOutcome};
 use crate::language::syntax::Header;
@@ -69,7 +69,7 @@ impl RigScenario {
     }
 
     /// Whether a drive may supervise the time between frames in it (T-Out): every query of the bench would begin that time again.
-    pub(super) fn may_time_out(&self, drives: &[Known]) -> bool {
+    pub(super) fn may_time_out(&self, drives: &[KnownDrives]) -> bool {
         let held = drives.iter().any(|known| known.cell(TIME_OUT) != 0);
         let header = self.plan.setup.drives.iter();
         let mut header = header.flat_map(|drive| &drive.registers);
@@ -109,7 +109,7 @@ impl RigScenario {
 
     /// The scenario in which lines that ask for the firmware ask for what it read on the drive: the scenario is for drives of any. Where its
     /// header or a step states it, it stays.
-    pub(super) fn with_firmware(&self, known: &[Known]) -> Self {
+    pub(super) fn with_firmware(&self, known: &[KnownDrives]) -> Self {
         let mut scenario = self.clone();
         let stated = |drive: &DriveSetup| {
             drive

@@ -2,7 +2,7 @@
 
 use super::note::{meaning, phases};
 use super::worlds::{AttemptFrames, BESIDE_THE_BUS, Proof, STOOD_STILL};
-use super::{AtRest, Other, Player, RigScenario};
+use super::{AtRest, ModelOptions, Player, RigScenario};
 use crate::judge::World;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
@@ -88,22 +88,25 @@ impl Player {
     pub(super) fn replayed(&self, scenario: &RigScenario, told: &AttemptFrames) -> Proof {
         let came = told.talk.came_since_it_began();
         let came: Vec<_> = came.map(|frame| meaning(frame, true)).collect();
-        let could_send = |other: &Other| {
+        let could_send = |other: &ModelOptions| {
             let played = self.rehearse(scenario, &self.limits, *other).noted.exchange;
             let sent = played.came_since_it_began();
             sent.map(|frame| meaning(frame, true))
                 .eq(came.iter().cloned())
         };
-        let phases = phases(1).map(|phase| Other {
+        let phases = phases(1).map(|phase| ModelOptions {
             phase,
-            ..Other::default()
+            ..ModelOptions::default()
         });
         let drives = self.known().iter().enumerate();
         let values = drives.flat_map(|(place, known)| {
-            known.candidates().into_iter().map(move |properties| Other {
-                drive: Some((place, properties)),
-                ..Other::default()
-            })
+            known
+                .candidates()
+                .into_iter()
+                .map(move |properties| ModelOptions {
+                    drive: Some((place, properties)),
+                    ..ModelOptions::default()
+                })
         });
         match phases.chain(values).any(|other| could_send(&other)) {
             true => Proof::Right,

@@ -1,14 +1,16 @@
 //! What came in an attempt, judged by right drives: whether one of them could have sent it.
 
 use super::super::Axis;
-use super::super::known::Known;
+use super::super::known::KnownDrives;
 use super::super::observed::Exchange;
 use super::Player;
 use super::counted::counted;
 use crate::judge::World;
 use crate::language::written;
 use crate::simulate::DriveSetup;
-use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, TimedPiece, judge_alive};
+use harness_bench::qualify::worlds::{
+    Dialogue, RightDrive as _, TimedPiece, WorldsVerdict, judge_alive,
+};
 use harness_bench::rig::playing::observed::LinkTimes;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -157,7 +159,7 @@ impl Player {
         }
     }
 
-    fn shown_by(&self, known: &Known, told: &AttemptFrames) -> Proof {
+    fn shown_by(&self, known: &KnownDrives, told: &AttemptFrames) -> Proof {
         let unlike = self.unlike(known, told);
         let talk = &told.talk;
         let (came, changed) = match self.came_from(known, talk) {
@@ -183,11 +185,11 @@ impl Player {
         };
         for (late, overtakes) in told.lateness() {
             match judged(known.properties, late, (overtakes, true), 0) {
-                Judged::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
-                Judged::Right => return Proof::Complete,
-                Judged::TooMany => return Proof::Unknown(TOO_MANY),
-                Judged::Unknown => return Proof::Unknown(NOT_FORETOLD),
-                Judged::Wrong(..) => {}
+                WorldsVerdict::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
+                WorldsVerdict::Right => return Proof::Complete,
+                WorldsVerdict::TooMany => return Proof::Unknown(TOO_MANY),
+                WorldsVerdict::Unknown => return Proof::Unknown(NOT_FORETOLD),
+                WorldsVerdict::Wrong(..) => {}
             }
         }
         let right = self.world(known, known.properties, &unlike, told);
@@ -200,11 +202,11 @@ impl Player {
         let mut wrong = None;
         for properties in std::iter::once(known.properties).chain(others) {
             match judged(properties, told.slowest(), (true, false), 0) {
-                Judged::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
-                Judged::Right => return Proof::Right,
-                Judged::TooMany => return Proof::Unknown(TOO_MANY),
-                Judged::Unknown => return Proof::Unknown(NOT_FORETOLD),
-                Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
+                WorldsVerdict::Right if changed => return Proof::Unknown(CHANGED_INPUTS),
+                WorldsVerdict::Right => return Proof::Right,
+                WorldsVerdict::TooMany => return Proof::Unknown(TOO_MANY),
+                WorldsVerdict::Unknown => return Proof::Unknown(NOT_FORETOLD),
+                WorldsVerdict::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
             }
         }
         let Some((place, expected)) = wrong else {
@@ -215,8 +217,8 @@ impl Player {
             let mut lateness = told.lateness().into_iter();
             lateness.any(|(late, overtakes)| {
                 let lossy = judged(known.properties, late, (overtakes, false), MOST_LOST);
-                unclear |= lossy == Judged::TooMany;
-                lossy == Judged::Right
+                unclear |= lossy == WorldsVerdict::TooMany;
+                lossy == WorldsVerdict::Right
             })
         };
         let missing = expected.filter(|_| told.way.tolerance > Span::ZERO && loses());
@@ -238,7 +240,7 @@ impl Player {
     /// unless that is `wrong`.
     pub(super) fn could_deviate(
         &self,
-        known: &Known,
+        known: &KnownDrives,
         setup: &DriveSetup,
         more: u8,
         shown: &AttemptFrames,
@@ -281,9 +283,9 @@ impl Player {
                 ..conversation(&shown.talk, &came, late)
             };
             match judge_alive(vec![deviant.clone()], &talk, &|| self.beats.beat()) {
-                Judged::Right => return Some(true),
-                Judged::Wrong(..) => {}
-                Judged::TooMany | Judged::Unknown => return None,
+                WorldsVerdict::Right => return Some(true),
+                WorldsVerdict::Wrong(..) => {}
+                WorldsVerdict::TooMany | WorldsVerdict::Unknown => return None,
             }
         }
         Some(false)
@@ -291,7 +293,7 @@ impl Player {
 
     /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model,
     /// which a right drive may.
-    fn unlike(&self, known: &Known, told: &AttemptFrames) -> Arc<BTreeSet<u8>> {
+    fn unlike(&self, known: &KnownDrives, told: &AttemptFrames) -> Arc<BTreeSet<u8>> {
         let explained = told.explained.iter();
         let explained = explained.filter(|(node, _)| *node == known.axis.node);
         let model = known.model(known.properties);
@@ -312,7 +314,7 @@ impl Player {
 
     fn world(
         &self,
-        known: &Known,
+        known: &KnownDrives,
         properties: Properties,
         unlike: &Arc<BTreeSet<u8>>,
         told: &AttemptFrames,
@@ -329,7 +331,7 @@ impl Player {
     /// Why that is not known.
     fn came_from(
         &self,
-        known: &Known,
+        known: &KnownDrives,
         talk: &Exchange,
     ) -> Result<(Vec<TimedFrame>, bool), &'static str> {
         let axis = known.axis;
@@ -467,7 +469,7 @@ fn say_the_same(one: &World, other: &World, told: &AttemptFrames) -> bool {
 
 /// What no right drive would have sent.
 fn words(
-    known: &Known,
+    known: &KnownDrives,
     came: &[(Instant, Instant, Frame)],
     place: usize,
     expected: Option<Frame>,

@@ -1,6 +1,6 @@
 //! Right inverters over every way to a bench, and wrong ones.
 
-use super::super::rehearse::Other;
+use super::super::rehearse::ModelOptions;
 use super::super::{Player, RigScenario};
 use super::*;
 use crate::rig::RigSlave;
@@ -27,8 +27,8 @@ const QUICK: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E 
 /// Ramps of 0.05 s (5.1).
 const FAST: [(u16, u32); 3] = [(1202, 1), (1203, 1), (1615, 1)];
 
-fn known(parameters: &[(u16, u32)]) -> Known {
-    let mut known = Known::new(RigSlave {
+fn known(parameters: &[(u16, u32)]) -> KnownInverters {
+    let mut known = KnownInverters::new(RigSlave {
         address: 8,
         ppo: Some(PpoType::One),
     });
@@ -39,11 +39,11 @@ fn known(parameters: &[(u16, u32)]) -> Known {
 }
 
 /// The telegrams of a run with a slave.
-fn turns(slave: &Known) -> Vec<Turn> {
+fn turns(slave: &KnownInverters) -> Vec<Turn> {
     turns_of(slave, RUN)
 }
 
-fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
+fn turns_of(slave: &KnownInverters, text: &'static str) -> Vec<Turn> {
     let source = Source::new("x", text);
     let scenario = RigScenario::read(&source).expect("a scenario");
     let limits = Limits::unlimited();
@@ -51,11 +51,17 @@ fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
     let (slaves, rate) = (vec![slave.slave], BusRate::K500);
     let mut player = Player::of(slaves, rate, patience, limits, Vec::new(), false);
     player.known = Some(vec![slave.clone()]);
-    player.rehearse(&scenario, &limits, Other::default()).turns
+    player
+        .rehearse(&scenario, &limits, ModelOptions::default())
+        .turns
 }
 
 /// Whether right slaves send this over a line that loses at most `most_lost` telegrams.
-fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usize>, Divergence> {
+fn sent_by(
+    known: &[KnownInverters],
+    most_lost: usize,
+    turns: &[Turn],
+) -> Result<Vec<usize>, Divergence> {
     right_slaves_send(known, BusRate::K500, most_lost, turns, &Beats::default())
 }
 
@@ -89,7 +95,7 @@ fn a_quick_stop_between_two_telegrams_accuses_no_slave() {
     stands_still(&known(&FAST), QUICK);
 }
 
-fn stands_still(slave: &Known, text: &'static str) {
+fn stands_still(slave: &KnownInverters, text: &'static str) {
     let right = turns_of(slave, text);
     let judged = |turns: &[Turn]| sent_by(std::slice::from_ref(slave), 0, turns).map(|_| ());
     assert_eq!(judged(&right), Ok(()));
