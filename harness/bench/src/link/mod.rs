@@ -97,7 +97,6 @@ pub enum PlacedFault {
     Link(usize, LinkFault),
     /// On a frame of a shared segment.
     Frame(FrameFault),
-    /// In a drive.
     Drive(u8, DriveFault),
     /// To a drive, from outside the bus; at a time only.
     Stimulus(u8, AnyStimulus),

@@ -47,7 +47,6 @@ pub struct WalkPart<S> {
     pub walked: BTreeSet<(S, usize)>,
 }
 
-/// A walk.
 #[derive(Debug)]
 pub struct Walk<S> {
     pub parts: Vec<WalkPart<S>>,

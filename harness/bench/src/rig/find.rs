@@ -26,7 +26,6 @@ pub enum FindError {
     NotFound {
         /// The name as given.
         name: String,
-        /// What there is.
         remedy: String,
     },
     /// `sim:` followed by something other than sizes of rings.

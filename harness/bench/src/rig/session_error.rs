@@ -16,11 +16,7 @@ pub enum SessionError {
     #[error(
         "rig {rig} has drives on the bus {bus}, and this command serves rings only; read, write, watch, info, params, position, go, stop, block, run and rig check serve it"
     )]
-    OtherBus {
-        rig: String,
-        /// Their bus.
-        bus: &'static str,
-    },
+    OtherBus { rig: String, bus: &'static str },
     /// A port cannot be opened, its drives do not answer, or its bus is in use.
     #[error("rig {rig}: {why}")]
     Drives {
@@ -47,7 +43,6 @@ pub enum SessionError {
     )]
     Quarantine {
         rig: String,
-        /// Since when.
         since: String,
         reason: String,
     },

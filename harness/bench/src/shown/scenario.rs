@@ -31,7 +31,6 @@ pub struct ScenarioView<'p> {
     pub drives: &'p str,
     /// Its text; empty where it is not known.
     pub text: &'p str,
-    /// Its outcome.
     pub outcome: &'p Outcome,
     /// What the links carried, ring by ring.
     pub traces: &'p [Trace],

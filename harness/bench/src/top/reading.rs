@@ -71,7 +71,6 @@ pub struct TopEvent {
     /// Whether it is an error.
     pub is_error: bool,
     pub count: u64,
-    /// When last.
     pub last: Span,
 }
 

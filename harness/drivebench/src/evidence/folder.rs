@@ -26,7 +26,6 @@ use std::time::SystemTime;
 /// What a record begins with.
 #[derive(Clone, Debug)]
 pub struct AboutRun<'r> {
-    /// The rig.
     pub rig: &'r Rig,
     /// Bits a second on its line.
     pub rate: u32,

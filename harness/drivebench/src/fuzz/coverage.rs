@@ -87,7 +87,6 @@ pub struct InputReach {
 /// What the inputs of a target reach.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Sum {
-    /// The target.
     pub target: &'static str,
     /// How many inputs it has.
     pub inputs: usize,

@@ -102,7 +102,6 @@ impl Walks {
         }
     }
 
-    /// Their conversations.
     pub(crate) fn conversations(&self) -> Vec<RingScenario> {
         let sources = self
             .walks

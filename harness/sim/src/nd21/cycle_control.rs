@@ -70,7 +70,6 @@ enum Course {
     Refused,
 }
 
-/// The cycle control.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CycleControl {
     /// GPIN3 of the cycle before.

@@ -49,7 +49,6 @@ struct Job {
     until: Instant,
 }
 
-/// The EEPROM controller.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EepromController {
     busy: Option<Job>,

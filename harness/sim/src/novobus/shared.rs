@@ -135,7 +135,6 @@ pub struct SentStream(u32);
 pub struct PlaceStep {
     /// The state of the place.
     place: PlaceState,
-    /// What it sent.
     sent: SentStream,
 }
 

@@ -232,7 +232,6 @@ pub struct RecordedCase {
 /// A part of a qualification that was split.
 #[derive(Clone, Debug)]
 pub struct RecordedPart {
-    /// Which.
     pub name: String,
     /// The selected scenarios, with their places in the list of all.
     pub selected: Vec<(usize, RecordedCase)>,

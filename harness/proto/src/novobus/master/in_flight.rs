@@ -15,7 +15,6 @@ pub(super) enum Owner {
     Idle,
     /// The telegram that counts the drives.
     Count,
-    /// A job.
     Job(Slot),
     /// The exchange of process data with a drive.
     Exchange(u8),

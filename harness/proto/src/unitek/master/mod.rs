@@ -97,7 +97,6 @@ enum Phase {
 enum Step {
     /// Asks until the register is 1.
     Until(u8),
-    /// Writes.
     Write(u8, u16),
     /// Locks, and keeps sending by event.
     Lock,

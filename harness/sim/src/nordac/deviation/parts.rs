@@ -98,7 +98,6 @@ impl Parts {
     }
 }
 
-/// A reply.
 #[derive(Clone, Debug)]
 pub(super) struct Reply {
     /// Its octets; none for no reply.
