@@ -330,7 +330,7 @@ macro_rules! text_values {
             }
         )*
 
-        /// Checks a text against the `format` of the schema; formats that are not ours fit every text.
+        /// Checks a text against the `format` of the schema. An unknown format accepts every text.
         pub(crate) fn check_format(format: &str, text: &str) -> Result<(), ValueError> {
             match format {
                 $($format => text.parse::<$value>().map(|_| ()),)*

@@ -328,7 +328,7 @@ pub trait PortLink: Link {
     /// Number of line errors since the last call that the transport reported without their byte.
     fn take_unplaced(&mut self) -> u64;
 
-    /// The same of reports that do not say whether something was lost.
+    /// Number of reports since the last call that do not say whether something was lost.
     fn take_doubtful(&mut self) -> u64 {
         0
     }

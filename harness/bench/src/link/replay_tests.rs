@@ -156,7 +156,7 @@ fn recorded(looks: bool) -> Vec<LinkEvent> {
     events.into_iter().filter(kept).collect()
 }
 
-/// Wherever a line of the record is moved to, deleted or doubled, the caller comes to its end. The work is bounded, not the time.
+/// Replay ends although a line of the record is moved, deleted or doubled. The work is bounded, not the time.
 #[test]
 fn no_order_of_the_record_holds_the_caller() {
     for looks in [true, false] {

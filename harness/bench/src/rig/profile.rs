@@ -55,7 +55,7 @@ pub struct SettledProperty<S> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KnownProfile {
     pub text: String,
-    /// What makes simulated drives behave so.
+    /// The header lines that make simulated drives behave so.
     pub lines: ProfileLines,
 }
 

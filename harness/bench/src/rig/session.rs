@@ -221,7 +221,7 @@ impl<D: RigDrives> RigSession<D> {
         &self.link
     }
 
-    /// Its ports' link, if it has ports: for what was measured there.
+    /// The link over its ports, with what was measured there; `None` if the rig is simulated.
     pub fn ports(&mut self) -> Option<&mut dyn PortLink> {
         self.link.inner_mut().ports_mut()
     }
@@ -315,7 +315,7 @@ impl<D: RigDrives> RigSession<D> {
         &self.left
     }
 
-    /// What shows the watchdog that the program works.
+    /// The counter by which the watchdog sees that the program works.
     pub fn beats(&mut self) -> Beats {
         let ports = self.ports();
         ports.map_or_else(Beats::default, |ports| Beats::of(ports.beats()))
@@ -417,7 +417,7 @@ impl<D: RigDrives> Drop for RigSession<D> {
     }
 }
 
-/// The header lines that a rig's file has for its drives: those of its profile, and behind them those of `[sim]`.
+/// The header lines that a rig's file has for its drives: those of its profile, then those of `[sim]`.
 pub(crate) fn setup_lines(rig: &Rig) -> Vec<String> {
     let profile = rig.profile.iter().flat_map(|profile| &profile.lines);
     let simulated = rig.file.sim.iter().flat_map(|sim| &sim.setup);

@@ -108,7 +108,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         found: &mut Vec<Problem>,
     ) -> Result<Self::Planner, Problem>;
 
-    /// What settles one more step on a bench that is settled.
+    /// A planner for one more step on a bench that is already planned.
     fn resume(setup: &Self::Setup) -> Self::Planner;
 
     /// A simulated bench, its devices set up as the plan says.

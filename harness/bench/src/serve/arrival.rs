@@ -17,7 +17,7 @@ pub(super) struct ClientStream {
 }
 
 impl ClientStream {
-    /// An accepted connection of a socket that listens since then.
+    /// An accepted connection of a socket that has listened since `listening`.
     pub(super) fn new(stream: TcpStream, listening: Instant) -> Self {
         Self {
             stream,

@@ -13,7 +13,7 @@ pub struct TopForm {
     pub drive: &'static str,
     /// The columns of the table. The first has the name of the drive, and the last takes the width that is left.
     pub columns: &'static [TopColumn],
-    /// The columns that give way in a narrow terminal, by their places, in this order.
+    /// The columns that a narrow terminal leaves out, by their places, in this order.
     pub give_way: &'static [usize],
     /// The states that a drive can be in, the most serious one first.
     pub states: &'static [&'static str],

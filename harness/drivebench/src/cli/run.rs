@@ -425,7 +425,7 @@ mod tests {
         assert_eq!(selected(step), 0);
     }
 
-    /// No scenario that a filter selects is left unread.
+    /// Every scenario that a filter selects is read.
     #[test]
     fn what_matches_may_match() {
         for source in sources(&[]).expect("the built-in ones") {

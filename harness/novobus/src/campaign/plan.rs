@@ -10,7 +10,7 @@ use std::ops::Range;
 pub(crate) struct Shape {
     /// How many drives the ring has.
     pub drives: u8,
-    /// Where telegrams begin, counted from 1, and after the last one the byte after the conversation.
+    /// The bytes at which telegrams begin, counted from 1; last, the byte after the conversation.
     pub telegrams: Vec<u64>,
 }
 

@@ -237,7 +237,7 @@ struct Beginning {
     drives: u8,
     /// In this time a byte passes all drives, at the earliest and at the latest.
     way: (Span, Span),
-    /// How much a time may be wrong.
+    /// The largest error of a time.
     tolerance: Span,
 }
 

@@ -37,7 +37,7 @@ pub(crate) struct NamedDeviation {
 pub(crate) enum AccusedDrives {
     /// One of these; more than one where the bytes do not tell which.
     OneOf(Vec<u8>),
-    /// All of them: one alone does not explain the bytes.
+    /// All drives: a deviation of one drive alone does not explain the bytes.
     Every,
 }
 

@@ -38,7 +38,7 @@ struct Data {
     /// Eight numbers an area: the first link and how many; the first row and how many; the state, and behind it as
     /// texts what the line carried, what it means by which rule, and what the drive remarked; a fault is -1 - state.
     areas: Vec<i64>,
-    /// For each link pairs: how long after the byte before it a byte ends, and how many bytes follow without a gap.
+    /// For each link, pairs: the time from the end of one byte to the end of the next, and how many bytes follow without a gap.
     times: Vec<Vec<u64>>,
 }
 

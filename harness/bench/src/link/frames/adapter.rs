@@ -157,7 +157,7 @@ pub(super) struct Slcan {
     listen_only: bool,
     /// Whether it answers commands.
     answers: bool,
-    /// Whether it was told to be silent.
+    /// Whether it was told not to send.
     silenced: bool,
     /// Number of lines in a row that no adapter sends.
     damaged: usize,

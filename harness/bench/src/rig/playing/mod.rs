@@ -209,7 +209,7 @@ pub struct RepeatedVerdict {
     pub exact: bool,
 }
 
-/// A scenario that a qualification plays behind the selected ones.
+/// A scenario that a qualification plays after the selected ones.
 #[derive(Clone, Debug)]
 pub struct QualifyingScenario {
     pub source: Source,

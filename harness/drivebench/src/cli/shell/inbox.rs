@@ -206,7 +206,7 @@ pub(super) fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Opti
 /// What waits to be written.
 enum OutputItem {
     Text(String),
-    /// All in front of it is written.
+    /// Reports that everything queued before it has been written.
     Mark(SyncSender<()>),
 }
 

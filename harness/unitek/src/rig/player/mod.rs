@@ -70,7 +70,7 @@ struct ModelOptions {
     phase: Span,
     /// The properties of the drive at a place, in place of those that are known.
     drive: Option<(usize, Properties)>,
-    /// Whether lines are played after one that is not met.
+    /// Whether play goes on after a line that is not met.
     goes_on: bool,
 }
 

@@ -20,7 +20,7 @@ use harness_proto::unitek::REGISTERS;
 use harness_proto::unitek::guard::Limits;
 use std::collections::BTreeSet;
 
-/// A deviation that shows in a conversation, by conversation.
+/// Conversations, each with a deviation that shows in it.
 const WRONG: [(&str, &str); 23] = [
     ("cycle-and-requests", "interval-in-two-milliseconds"),
     ("cycles-and-contents", "cyclic-frames-never-change"),

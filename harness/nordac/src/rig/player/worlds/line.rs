@@ -324,7 +324,7 @@ pub(super) fn narrow(octets: &[u16]) -> Vec<u8> {
     octets.iter().map(|octet| *octet as u8).collect()
 }
 
-/// The telegram that begins here, without a line error, and how many octets it has.
+/// The telegram that begins here, if it has no line error, and its number of octets.
 pub(super) fn telegram(octets: &[u16]) -> Option<(Telegram, usize)> {
     let octets = octets.iter().take(MAX_TELEGRAM);
     let good = octets.map_while(|octet| u8::try_from(*octet).ok());
