@@ -66,11 +66,11 @@ impl core::error::Error for BadMark {}
 /// Reads a marked stream byte by byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unmark {
-    state: State,
+    state: MarkState,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum State {
+enum MarkState {
     #[default]
     Plain,
     /// Behind an FF.
@@ -86,14 +86,17 @@ impl Unmark {
     /// [`BadMark`]; the byte is dropped, and the decoder restarts at the next one.
     pub fn push(&mut self, byte: u8) -> Option<Result<Received, BadMark>> {
         let (state, read) = match (self.state, byte) {
-            (State::Plain, MARK) => (State::Marked, None),
-            (State::Plain, byte) => (State::Plain, Some(Ok(Received::good(byte)))),
-            (State::Marked, MARK) => (State::Plain, Some(Ok(Received::good(MARK)))),
-            (State::Marked, 0) => (State::Damaged, None),
-            (State::Marked, byte) => (State::Plain, Some(Err(BadMark { byte }))),
-            (State::Damaged, 0) => (State::Plain, Some(Ok(Received::bad(0, LineError::Break)))),
-            (State::Damaged, byte) => (
-                State::Plain,
+            (MarkState::Plain, MARK) => (MarkState::Marked, None),
+            (MarkState::Plain, byte) => (MarkState::Plain, Some(Ok(Received::good(byte)))),
+            (MarkState::Marked, MARK) => (MarkState::Plain, Some(Ok(Received::good(MARK)))),
+            (MarkState::Marked, 0) => (MarkState::Damaged, None),
+            (MarkState::Marked, byte) => (MarkState::Plain, Some(Err(BadMark { byte }))),
+            (MarkState::Damaged, 0) => (
+                MarkState::Plain,
+                Some(Ok(Received::bad(0, LineError::Break))),
+            ),
+            (MarkState::Damaged, byte) => (
+                MarkState::Plain,
                 Some(Ok(Received::bad(byte, LineError::Parity))),
             ),
         };
@@ -104,7 +107,7 @@ impl Unmark {
     /// Whether the stream may end here: not in the middle of a mark.
     #[must_use]
     pub fn at_boundary(self) -> bool {
-        self.state == State::Plain
+        self.state == MarkState::Plain
     }
 }
 

@@ -89,7 +89,7 @@ impl<S: LineStation + ?Sized> LineStation for Box<S> {
 
 /// An octet that waits for its turn.
 #[derive(Clone, Copy, Debug)]
-struct Waiting {
+struct QueuedOctet {
     octet: Octet,
     /// Whether the station sends it, rather than a fault.
     genuine: bool,
@@ -108,9 +108,9 @@ struct Flying {
 
 /// What the line keeps of a station.
 #[derive(Clone, Debug, Default)]
-struct Member {
+struct LineMember {
     /// The telegram under way, and the place of its next octet.
-    telegram: Vec<Waiting>,
+    telegram: Vec<QueuedOctet>,
     next: usize,
     /// When its next octet begins.
     begins: Instant,
@@ -128,7 +128,7 @@ struct Member {
     record: Vec<LineByte>,
 }
 
-impl Member {
+impl LineMember {
     fn is_sending(&self) -> bool {
         self.next < self.telegram.len() || self.flying.is_some()
     }
@@ -136,11 +136,12 @@ impl Member {
     /// Puts a telegram on the way, its first octet to begin at `at`.
     fn load(&mut self, at: Instant, octets: &[Octet]) {
         self.telegram.clear();
-        self.telegram.extend(octets.iter().map(|&octet| Waiting {
-            octet,
-            genuine: true,
-            counted: None,
-        }));
+        self.telegram
+            .extend(octets.iter().map(|&octet| QueuedOctet {
+                octet,
+                genuine: true,
+                counted: None,
+            }));
         self.next = 0;
         self.begins = at + self.pause();
     }
@@ -155,7 +156,7 @@ impl Member {
 
 /// What happens next; at one instant in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Event {
+enum LineEvent {
     /// An octet ends.
     End,
     /// A station does something by itself.
@@ -173,7 +174,7 @@ pub struct OctetSegment<S> {
     bit: Span,
     octet: Span,
     stations: Vec<S>,
-    members: Vec<Member>,
+    members: Vec<LineMember>,
     faults: Vec<LineFaultAt>,
     octets: u64,
     telegrams: u64,
@@ -198,7 +199,7 @@ impl<S: LineStation> OctetSegment<S> {
             format,
             bit: Span::from_units(bit),
             octet: format.octet_time(),
-            members: vec![Member::default(); stations.len()],
+            members: vec![LineMember::default(); stations.len()],
             stations,
             faults: Vec::new(),
             octets: 0,
@@ -318,7 +319,7 @@ impl<S: LineStation> OctetSegment<S> {
     /// Whether a telegram is under way.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.members.iter().any(Member::is_sending)
+        self.members.iter().any(LineMember::is_sending)
     }
 
     /// When something happens next; `None` while all stations wait.
@@ -332,10 +333,10 @@ impl<S: LineStation> OctetSegment<S> {
         while let Some((at, event, place)) = self.next().filter(|(at, ..)| *at <= to) {
             self.now = self.now.max(at);
             match event {
-                Event::End => self.stream(place, to),
-                Event::Act => self.stations[place].advance(at),
-                Event::Octet => self.begin_octet(place, at),
-                Event::Telegram => self.begin_telegrams(at),
+                LineEvent::End => self.stream(place, to),
+                LineEvent::Act => self.stations[place].advance(at),
+                LineEvent::Octet => self.begin_octet(place, at),
+                LineEvent::Telegram => self.begin_telegrams(at),
             }
         }
         self.now = self.now.max(to);
@@ -374,23 +375,23 @@ impl<S: LineStation> OctetSegment<S> {
     }
 
     /// What happens next, when, and to which station.
-    fn next(&self) -> Option<(Instant, Event, usize)> {
-        let mut first: Option<(Instant, Event, usize)> = None;
-        let mut note = |event: (Instant, Event, usize)| {
+    fn next(&self) -> Option<(Instant, LineEvent, usize)> {
+        let mut first: Option<(Instant, LineEvent, usize)> = None;
+        let mut note = |event: (Instant, LineEvent, usize)| {
             if first.is_none_or(|known| event < known) {
                 first = Some(event);
             }
         };
         for (place, (station, member)) in self.stations.iter().zip(&self.members).enumerate() {
             if let Some(flying) = &member.flying {
-                note((flying.end, Event::End, place));
+                note((flying.end, LineEvent::End, place));
             } else if member.next < member.telegram.len() {
-                note((member.begins, Event::Octet, place));
+                note((member.begins, LineEvent::Octet, place));
             } else if let Some(at) = self.start_of(place) {
-                note((at, Event::Telegram, place));
+                note((at, LineEvent::Telegram, place));
             }
             if let Some(at) = station.next_action() {
-                note((at, Event::Act, place));
+                note((at, LineEvent::Act, place));
             }
         }
         first
@@ -500,7 +501,7 @@ impl<S: LineStation> OctetSegment<S> {
     fn begin_octet(&mut self, place: usize, at: Instant) {
         let numbers = self.count(place);
         let member = &self.members[place];
-        let Waiting { octet, genuine, .. } = member.telegram[member.next];
+        let QueuedOctet { octet, genuine, .. } = member.telegram[member.next];
         let sent = genuine.then_some(octet.byte);
         let mut received = Some(Received {
             byte: octet.byte ^ octet.flips.data,
@@ -518,7 +519,7 @@ impl<S: LineStation> OctetSegment<S> {
                         LinkFault::Insert(byte) => (member.next, byte),
                         _ => (member.next + 1, octet.byte),
                     };
-                    let inserted = Waiting {
+                    let inserted = QueuedOctet {
                         octet: byte.into(),
                         genuine: false,
                         counted: None,

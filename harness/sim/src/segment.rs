@@ -110,7 +110,7 @@ pub struct Placed {
 
 /// What the segment keeps of a station.
 #[derive(Clone, Copy, Debug, Default)]
-struct Member {
+struct SegmentMember {
     /// Transmit error counter.
     errors: u16,
     off: bool,
@@ -122,7 +122,7 @@ struct Member {
     held_until: Instant,
 }
 
-impl Member {
+impl SegmentMember {
     fn failed(&mut self, error: CanError) {
         // A passive station alone on a bus does not count on, so that it never goes to bus-off (ISO 11898-1).
         if error == CanError::NoAcknowledge && self.errors >= PASSIVE {
@@ -138,7 +138,7 @@ impl Member {
 pub struct Segment<S> {
     rate: BitRate,
     stations: Vec<S>,
-    members: Vec<Member>,
+    members: Vec<SegmentMember>,
     faults: Vec<Placed>,
     /// Frames of all stations so far.
     frames: u64,
@@ -157,7 +157,7 @@ impl<S: Station> Segment<S> {
     pub fn new(rate: BitRate, stations: Vec<S>) -> Self {
         Self {
             rate,
-            members: vec![Member::default(); stations.len()],
+            members: vec![SegmentMember::default(); stations.len()],
             stations,
             faults: Vec::new(),
             frames: 0,
@@ -501,7 +501,7 @@ impl<S: Station> Segment<S> {
 }
 
 /// The next frame of a station that takes part, and from when on it is sent.
-fn wanted<S: Station>(station: &S, member: &Member) -> Option<(Instant, Frame)> {
+fn wanted<S: Station>(station: &S, member: &SegmentMember) -> Option<(Instant, Frame)> {
     if member.off {
         return None;
     }

@@ -22,11 +22,11 @@ pub struct Startup {
     ppo: PpoType,
     /// The two factors of the watchdog; `None` leaves it off.
     watchdog: Option<[u8; 2]>,
-    step: Step,
+    step: StartStep,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
+enum StartStep {
     Find,
     Parametrise,
     Configure,
@@ -41,7 +41,7 @@ impl Startup {
         Self {
             ppo,
             watchdog,
-            step: Step::Find,
+            step: StartStep::Find,
         }
     }
 
@@ -51,11 +51,11 @@ impl Startup {
     /// [`BadTelegram`] never for the data of a start.
     pub fn next(&self, requests: &mut Requests) -> Result<Option<Pdu>, BadTelegram> {
         let pdu = match self.step {
-            Step::Find => {
+            StartStep::Find => {
                 requests.restart();
                 requests.request(Service::SlaveDiag, &[])?
             }
-            Step::Parametrise => {
+            StartStep::Parametrise => {
                 let mut prm = SetPrm::lock(IDENT);
                 if let Some(factors) = self.watchdog {
                     prm.status |= SetPrm::WATCHDOG;
@@ -64,9 +64,9 @@ impl Startup {
                 let data = prm.encode().unwrap_or_default();
                 requests.request(Service::SetPrm, &data)?
             }
-            Step::Configure => requests.request(Service::ChkCfg, self.ppo.cfg())?,
-            Step::Ready(_) => requests.request(Service::SlaveDiag, &[])?,
-            Step::Done => return Ok(None),
+            StartStep::Configure => requests.request(Service::ChkCfg, self.ppo.cfg())?,
+            StartStep::Ready(_) => requests.request(Service::SlaveDiag, &[])?,
+            StartStep::Done => return Ok(None),
         };
         Ok(Some(pdu))
     }
@@ -77,23 +77,23 @@ impl Startup {
     /// [`StartError`]: the slave does not get into the exchange.
     pub fn take(&mut self, reply: Option<SlaveReply>) -> Result<(), StartError> {
         let service = match self.step {
-            Step::Find | Step::Ready(_) => Service::SlaveDiag,
-            Step::Parametrise => Service::SetPrm,
-            Step::Configure => Service::ChkCfg,
-            Step::Done => return Ok(()),
+            StartStep::Find | StartStep::Ready(_) => Service::SlaveDiag,
+            StartStep::Parametrise => Service::SetPrm,
+            StartStep::Configure => Service::ChkCfg,
+            StartStep::Done => return Ok(()),
         };
         let reply = reply.ok_or(StartError::NoReply { service })?;
         self.step = match (self.step, reply) {
-            (Step::Find, SlaveReply::Data { data, .. }) => {
+            (StartStep::Find, SlaveReply::Data { data, .. }) => {
                 let found = Diagnosis::decode(&data).ok_or(StartError::Unexpected { service })?;
                 if found.ident != IDENT {
                     return Err(StartError::OtherDevice { ident: found.ident });
                 }
-                Step::Parametrise
+                StartStep::Parametrise
             }
-            (Step::Parametrise, SlaveReply::Confirmed) => Step::Configure,
-            (Step::Configure, SlaveReply::Confirmed) => Step::Ready(0),
-            (Step::Ready(tries), SlaveReply::Data { data, .. }) => {
+            (StartStep::Parametrise, SlaveReply::Confirmed) => StartStep::Configure,
+            (StartStep::Configure, SlaveReply::Confirmed) => StartStep::Ready(0),
+            (StartStep::Ready(tries), SlaveReply::Data { data, .. }) => {
                 let found = Diagnosis::decode(&data).ok_or(StartError::Unexpected { service })?;
                 let refused = found.has(Diagnosis::PRM_FAULT)
                     || found.has(Diagnosis::CFG_FAULT)
@@ -102,8 +102,8 @@ impl Startup {
                     return Err(StartError::Refused(found));
                 }
                 match found.has(Diagnosis::NOT_READY) {
-                    true => Step::Ready(tries + 1),
-                    false => Step::Done,
+                    true => StartStep::Ready(tries + 1),
+                    false => StartStep::Done,
                 }
             }
             (_, SlaveReply::NotActivated) => return Err(StartError::NotActivated { service }),

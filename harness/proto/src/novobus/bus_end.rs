@@ -60,7 +60,7 @@ pub enum Deadline {
 /// A drive's end of the bus.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BusEnd {
-    state: State,
+    state: BusEndState,
     /// When the last byte was received; `None` until the first one arms the monitoring (9.9).
     last_received: Option<Instant>,
     /// Whether an address byte has passed since power-up and since the last check sequence.
@@ -73,7 +73,7 @@ pub struct BusEnd {
 
 /// What the next byte is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum State {
+enum BusEndState {
     /// A sync byte.
     Sync,
     /// The address byte of a telegram.
@@ -83,12 +83,12 @@ enum State {
     /// A net byte of a telegram for this drive.
     Addressed { left: u8, next: Net },
     /// Any byte: the drive is in the error mode.
-    Error(ErrorMode, Silence),
+    Error(ErrorMode, LineSilence),
 }
 
 /// How long the line has been silent, for a drive in the error mode (9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Silence {
+enum LineSilence {
     /// Not too long.
     None,
     /// Too long: a time-out. The drive waits until then before it sends unasked.
@@ -135,7 +135,7 @@ impl BusEnd {
     #[inline]
     pub fn new(properties: Properties) -> Self {
         Self {
-            state: State::Sync,
+            state: BusEndState::Sync,
             last_received: None,
             short_address_valid: false,
             channel: ParameterChannel::default(),
@@ -179,11 +179,11 @@ impl BusEnd {
     #[inline]
     pub fn place(&self) -> Place {
         match &self.state {
-            State::Sync => Place::Sync,
-            State::Address(_) => Place::Address,
-            State::Passing { .. } => Place::Passing,
-            State::Error(..) => Place::ErrorMode,
-            State::Addressed { next, .. } => match next {
+            BusEndState::Sync => Place::Sync,
+            BusEndState::Address(_) => Place::Address,
+            BusEndState::Passing { .. } => Place::Passing,
+            BusEndState::Error(..) => Place::ErrorMode,
+            BusEndState::Addressed { next, .. } => match next {
                 Net::ProcessHigh => Place::ProcessHigh,
                 Net::ProcessLow { .. } => Place::ProcessLow,
                 Net::Parameter => self.channel.next().map_or(Place::Command, Place::Parameter),
@@ -210,14 +210,14 @@ impl BusEnd {
     #[must_use]
     #[inline]
     pub const fn in_error(&self) -> bool {
-        matches!(self.state, State::Error(..))
+        matches!(self.state, BusEndState::Error(..))
     }
 
     /// Whether it answers the next byte with received + 1 (ND21 9.7).
     #[must_use]
     pub const fn increments(&self) -> bool {
         match &self.state {
-            State::Error(error, ..) => error.increments(),
+            BusEndState::Error(error, ..) => error.increments(),
             _ => false,
         }
     }
@@ -239,10 +239,10 @@ impl BusEnd {
         self.last_received = Some(now);
         match &mut self.state {
             // Nearly every byte of a large ring: not for this drive, and not looked at (9.3).
-            State::Passing { left } if received.error.is_none() => {
+            BusEndState::Passing { left } if received.error.is_none() => {
                 *left -= 1;
                 if *left == 0 {
-                    self.state = State::Sync;
+                    self.state = BusEndState::Sync;
                 }
                 Reaction::plain(received.byte)
             }
@@ -253,8 +253,8 @@ impl BusEnd {
     /// Takes a byte that this drive looks at.
     #[inline]
     fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Reaction {
-        if let State::Error(mode, silence) = &mut self.state {
-            let waiting = matches!(silence, Silence::Waiting { .. });
+        if let BusEndState::Error(mode, silence) = &mut self.state {
+            let waiting = matches!(silence, LineSilence::Waiting { .. });
             let step = if waiting && self.properties.time_out_answer == TimeOutAnswer::Silent {
                 Reaction {
                     byte: None,
@@ -290,8 +290,10 @@ impl BusEnd {
     #[must_use]
     pub fn due(&self, monitored: impl FnOnce() -> bool) -> Option<Deadline> {
         match self.state {
-            State::Error(_, Silence::Waiting { until }) => Some(Deadline::At(until)),
-            State::Error(_, Silence::Sending { since }) => Some(Deadline::LineFree(since)),
+            BusEndState::Error(_, LineSilence::Waiting { until }) => Some(Deadline::At(until)),
+            BusEndState::Error(_, LineSilence::Sending { since }) => {
+                Some(Deadline::LineFree(since))
+            }
             _ if monitored() => Some(Deadline::At(self.last_received? + self.properties.time_out)),
             _ => None,
         }
@@ -301,26 +303,27 @@ impl BusEnd {
     /// a further wait, zeros go out, one whenever the line is free. A drive that is already in the error mode
     /// also monitors the time, because a breaking cable often causes a damaged byte first.
     pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Reaction {
-        let waiting = Silence::Waiting {
+        let waiting = LineSilence::Waiting {
             until: now + self.properties.time_out_wait,
         };
         match &mut self.state {
-            State::Error(mode, silence @ Silence::None) => {
+            BusEndState::Error(mode, silence @ LineSilence::None) => {
                 mode.time_out();
                 *silence = waiting;
                 Reaction::default()
             }
-            State::Error(_, silence @ Silence::Waiting { .. }) => {
-                *silence = Silence::Sending { since: now };
+            BusEndState::Error(_, silence @ LineSilence::Waiting { .. }) => {
+                *silence = LineSilence::Sending { since: now };
                 Reaction::default()
             }
-            State::Error(mode, Silence::Sending { .. }) => Reaction {
+            BusEndState::Error(mode, LineSilence::Sending { .. }) => Reaction {
                 byte: Some(0),
                 marks: mode.send_zero(),
             },
             _ => {
                 self.blame(BusError::TimeOut, memory);
-                self.state = State::Error(ErrorMode::enter_after_time_out(self.rules), waiting);
+                self.state =
+                    BusEndState::Error(ErrorMode::enter_after_time_out(self.rules), waiting);
                 Reaction {
                     byte: None,
                     marks: Marks::DETECTED,
@@ -333,8 +336,8 @@ impl BusEnd {
     #[inline(never)]
     fn normal<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Reaction, BusError> {
         match &mut self.state {
-            State::Sync => self.sync_byte(byte, memory),
-            State::Address(header) => {
+            BusEndState::Sync => self.sync_byte(byte, memory),
+            BusEndState::Address(header) => {
                 let header = *header;
                 let sum = passed_on(byte);
                 memory.write(nd21::ram::BUS_ADDR, sum);
@@ -342,7 +345,7 @@ impl BusEnd {
                 self.begin_net_bytes(header, sum == ADDRESSED);
                 Ok(Reaction::plain(sum))
             }
-            State::Addressed { left, next } => {
+            BusEndState::Addressed { left, next } => {
                 let step = match *next {
                     Net::ProcessHigh => {
                         let [high, low] = process_data_out(memory);
@@ -376,11 +379,11 @@ impl BusEnd {
                 };
                 *left -= 1;
                 if *left == 0 {
-                    self.state = State::Sync;
+                    self.state = BusEndState::Sync;
                 }
                 Ok(step)
             }
-            State::Passing { .. } | State::Error(..) => Ok(Reaction::plain(byte)),
+            BusEndState::Passing { .. } | BusEndState::Error(..) => Ok(Reaction::plain(byte)),
         }
     }
 
@@ -397,7 +400,7 @@ impl BusEnd {
             return Err(BusError::Sync);
         }
         if header.addressing() == Addressing::AddressFollows {
-            self.state = State::Address(header);
+            self.state = BusEndState::Address(header);
             return Ok(Reaction::plain(byte));
         }
         let valid =
@@ -414,9 +417,9 @@ impl BusEnd {
     fn begin_net_bytes(&mut self, header: TelegramHeader, addressed: bool) {
         let left = header.net_length();
         self.state = match (left, addressed) {
-            (0, _) => State::Sync,
-            (_, false) => State::Passing { left },
-            (_, true) => State::Addressed {
+            (0, _) => BusEndState::Sync,
+            (_, false) => BusEndState::Passing { left },
+            (_, true) => BusEndState::Addressed {
                 left,
                 next: if header.process_data() {
                     Net::ProcessHigh
@@ -435,7 +438,7 @@ impl BusEnd {
         memory: &mut M,
     ) -> Reaction {
         self.blame(error, memory);
-        self.state = State::Error(ErrorMode::enter(offending, self.rules), Silence::None);
+        self.state = BusEndState::Error(ErrorMode::enter(offending, self.rules), LineSilence::None);
         Reaction {
             byte: Some(0),
             marks: Marks::DETECTED,
@@ -452,7 +455,7 @@ impl BusEnd {
     /// address valid.
     #[inline]
     fn leave_error_mode(&mut self) {
-        self.state = State::Sync;
+        self.state = BusEndState::Sync;
         self.channel = ParameterChannel::default();
         self.short_address_valid = false;
     }

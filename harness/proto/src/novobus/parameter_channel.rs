@@ -48,7 +48,7 @@ pub struct Parameter {
 }
 
 /// An answer byte with the marks of the manual's tables, and whether the drive resets after it.
-pub(super) struct Answer {
+pub(super) struct AnswerByte {
     pub(super) byte: u8,
     pub(super) marks: Marks,
     pub(super) reset: bool,
@@ -77,7 +77,7 @@ impl ParameterChannel {
         byte: u8,
         read_long: ReadLongAnswer,
         memory: &mut M,
-    ) -> Result<Answer, BusError> {
+    ) -> Result<AnswerByte, BusError> {
         let Some(partial) = &mut self.partial else {
             let layout = layout(byte, read_long).ok_or(BusError::Command)?;
             self.partial = Some(Partial {
@@ -89,7 +89,7 @@ impl ParameterChannel {
                 command_sum: Checksum::EMPTY.with(byte),
                 answer_sum: Checksum::EMPTY.with(byte),
             });
-            return Ok(Answer {
+            return Ok(AnswerByte {
                 byte,
                 marks: Marks::NONE,
                 reset: false,
@@ -106,7 +106,7 @@ impl ParameterChannel {
         if field == Field::Check {
             self.partial = None;
         }
-        Ok(Answer { reset, ..answer })
+        Ok(AnswerByte { reset, ..answer })
     }
 }
 
@@ -190,13 +190,13 @@ impl Partial {
         }
     }
 
-    fn reply(&self, reply: Reply, received: u8) -> Answer {
+    fn reply(&self, reply: Reply, received: u8) -> AnswerByte {
         let (byte, marks) = match reply {
             Reply::Echo => (received, Marks::NONE),
             Reply::Data(i) => (self.data[usize::from(i)], Marks::ANSWER),
             Reply::Check => (self.answer_sum.minus(), Marks::CHECKSUM),
         };
-        Answer {
+        AnswerByte {
             byte,
             marks,
             reset: false,

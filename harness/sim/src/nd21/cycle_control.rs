@@ -61,7 +61,7 @@ enum Serial {
 
 /// What has become of the function that was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Course {
+enum FunctionCourse {
     /// It is being done.
     Working,
     /// It is done; GPO1 shows this level.
@@ -74,7 +74,7 @@ enum Course {
 pub(super) struct CycleControl {
     /// GPIN3 of the cycle before.
     started: bool,
-    running: Option<(Function, Course)>,
+    running: Option<(Function, FunctionCourse)>,
     serial: Option<Serial>,
     /// The position and the parameter that were transmitted, the position that is read.
     position: u32,
@@ -104,10 +104,10 @@ impl CycleControl {
     /// The function that a PLC has ordered, and its state, for observers.
     pub(super) fn ordered(&self) -> Option<(Function, &'static str)> {
         self.running.map(|(function, course)| match course {
-            Course::Working => (function, "working"),
-            Course::Done(true) => (function, "done, GPO1 high"),
-            Course::Done(false) => (function, "done, GPO1 low"),
-            Course::Refused => (function, "refused"),
+            FunctionCourse::Working => (function, "working"),
+            FunctionCourse::Done(true) => (function, "done, GPO1 high"),
+            FunctionCourse::Done(false) => (function, "done, GPO1 low"),
+            FunctionCourse::Refused => (function, "refused"),
         })
     }
 
@@ -151,7 +151,7 @@ impl CycleControl {
         self.at_rest = start == self.started && self.running.is_none();
         self.started = start;
         if !start {
-            if let Some((Function::StartPs, Course::Working)) = self.running {
+            if let Some((Function::StartPs, FunctionCourse::Working)) = self.running {
                 // The function is ended (13.1.6): a start that has not begun is none.
                 reach
                     .cells
@@ -162,7 +162,7 @@ impl CycleControl {
             // It does not go on when the error is confirmed.
             self.running = self
                 .running
-                .map(|(function, _)| (function, Course::Refused));
+                .map(|(function, _)| (function, FunctionCourse::Refused));
         } else if edge {
             let gpin8 = reach.cells.byte(ram::SW_VERSION2) & sw_version2::NO_GPIN8 == 0
                 && reach.cells.byte(ram::HW_VERSION) & hw_version::ANALOGUE == 0;
@@ -172,24 +172,30 @@ impl CycleControl {
                 .filter(|function| mode != Mode::Error || *function == Function::RdError);
             self.running =
                 function.map(|function| (function, self.take(function, &mut reach, &mut orders)));
-        } else if let Some((function, Course::Working)) = self.running {
+        } else if let Some((function, FunctionCourse::Working)) = self.running {
             let course = self.go_on(function, &mut reach);
             self.running = Some((function, course));
         }
         if let Some((function, course)) = self.running {
             hold(function, course, &mut orders, reach.cells);
             // A function that is done waits for GPIN3, which is an input.
-            self.at_rest = matches!(course, Course::Done(_) | Course::Refused) && !edge;
+            self.at_rest =
+                matches!(course, FunctionCourse::Done(_) | FunctionCourse::Refused) && !edge;
         }
         if reach.cells.byte(ram::HW_VERSION2) & hw_version2::NO_ANALOGUE_OUTPUT != 0 {
-            let high = matches!(self.running, Some((_, Course::Done(true))));
+            let high = matches!(self.running, Some((_, FunctionCourse::Done(true))));
             reach.cells.set_bits(OUTPUTS, GPO1, high);
         }
         orders
     }
 
     /// A function begins.
-    fn take(&mut self, function: Function, reach: &mut Reach<'_>, orders: &mut Orders) -> Course {
+    fn take(
+        &mut self,
+        function: Function,
+        reach: &mut Reach<'_>,
+        orders: &mut Orders,
+    ) -> FunctionCourse {
         let serial = match function {
             Function::Wr0 | Function::Wr1 => Some(Serial::Position),
             Function::Wr0Param | Function::Wr1Param => Some(Serial::Parameter),
@@ -206,7 +212,7 @@ impl CycleControl {
             Function::WrNMax | Function::WrVtippen | Function::WrNRampe | Function::WrI
                 if !self.has_parameter =>
             {
-                return Course::Refused;
+                return FunctionCourse::Refused;
             }
             Function::ClrPz => cells.put(ram::PZ, 0),
             Function::IncPz => move_marker(1, cells),
@@ -236,7 +242,9 @@ impl CycleControl {
             Function::Leitungstest => orders.error = Some(LINE_TEST),
             Function::RdPos => return self.read_position(cells),
             Function::RdError => return self.read_error(orders, cells),
-            Function::WrPs | Function::WrEe if !self.has_position => return Course::Refused,
+            Function::WrPs | Function::WrEe if !self.has_position => {
+                return FunctionCourse::Refused;
+            }
             Function::WrPs => load(self.position, cells),
             Function::RdEeWrPs => {
                 let position = stored_position(cells);
@@ -245,7 +253,7 @@ impl CycleControl {
             }
             Function::StartPs => {
                 if cells.byte(ram::PS_STATUS) & ps_status::CALCULATED == 0 {
-                    return Course::Refused;
+                    return FunctionCourse::Refused;
                 }
                 cells.set_bits(ram::PS_STATUS, ps_status::START, true);
             }
@@ -263,7 +271,7 @@ impl CycleControl {
     }
 
     /// Whether the function is done.
-    fn go_on(&mut self, function: Function, reach: &mut Reach<'_>) -> Course {
+    fn go_on(&mut self, function: Function, reach: &mut Reach<'_>) -> FunctionCourse {
         let status = reach.cells.byte(ram::PS_STATUS);
         let done = match function {
             Function::WrPs | Function::RdEeWrPs | Function::WaitPs => {
@@ -283,9 +291,9 @@ impl CycleControl {
             _ => true,
         };
         if done {
-            Course::Done(true)
+            FunctionCourse::Done(true)
         } else {
-            Course::Working
+            FunctionCourse::Working
         }
     }
 
@@ -314,7 +322,7 @@ impl CycleControl {
         let asked = reach.cells.byte(ram::FLAGS2) & flags2::TEACH_IN != 0;
         let by_plc = matches!(
             self.running,
-            Some((Function::TeachIn | Function::WrEe, Course::Working))
+            Some((Function::TeachIn | Function::WrEe, FunctionCourse::Working))
         );
         if asked && !by_plc {
             let position = actual_position(reach.cells);
@@ -347,46 +355,46 @@ impl CycleControl {
     }
 
     /// Bit 0 first (13.1.9.5).
-    fn read_position(&mut self, cells: &mut Cells) -> Course {
+    fn read_position(&mut self, cells: &mut Cells) -> FunctionCourse {
         if cells.byte(ram::HW_VERSION2) & hw_version2::RD_POS == 0 {
-            return Course::Done(true);
+            return FunctionCourse::Done(true);
         }
         let bit = count(32, cells) - 1;
         if bit == 0 {
             self.read = cells.long(ram::UMDRIST);
         }
-        Course::Done(self.read >> bit & 1 != 0)
+        FunctionCourse::Done(self.read >> bit & 1 != 0)
     }
 }
 
 impl CycleControl {
     /// The 12 bits of the error code as it stood at the first of them, and the 13th read, which confirms that
     /// error (13.1.7.4).
-    fn read_error(&mut self, orders: &mut Orders, cells: &mut Cells) -> Course {
+    fn read_error(&mut self, orders: &mut Orders, cells: &mut Cells) -> FunctionCourse {
         let bit = count(ERROR_BITS + 1, cells) - 1;
         if bit == 0 {
             self.error = cells.word(ram::ERRORCODE);
         }
         if bit == ERROR_BITS {
             orders.confirm = cells.word(ram::ERRORCODE) == self.error;
-            return Course::Done(true);
+            return FunctionCourse::Done(true);
         }
-        Course::Done(self.error >> bit & 1 != 0)
+        FunctionCourse::Done(self.error >> bit & 1 != 0)
     }
 }
 
 /// Whether a function does something as long as GPIN3 is high.
-fn goes_on((function, course): (Function, Course)) -> bool {
+fn goes_on((function, course): (Function, FunctionCourse)) -> bool {
     let holds = matches!(
         function,
         Function::TippenMinus | Function::TippenPlus | Function::RdPos
     );
-    holds || course == Course::Working
+    holds || course == FunctionCourse::Working
 }
 
 /// What a function asks for as long as GPIN3 is high.
-fn hold(function: Function, course: Course, orders: &mut Orders, cells: &Cells) {
-    if course == Course::Refused {
+fn hold(function: Function, course: FunctionCourse, orders: &mut Orders, cells: &Cells) {
+    if course == FunctionCourse::Refused {
         return;
     }
     let jog = match function {

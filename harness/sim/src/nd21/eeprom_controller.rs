@@ -42,7 +42,7 @@ impl Command {
 
 /// A command that is being done: with the address and the byte that stood in the buffer when it was given.
 #[derive(Clone, Copy, Debug)]
-struct Job {
+struct EepromJob {
     command: Command,
     address: u8,
     data: u8,
@@ -51,7 +51,7 @@ struct Job {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct EepromController {
-    busy: Option<Job>,
+    busy: Option<EepromJob>,
     /// Where a position is being stored, which, and until when.
     storing: Option<(u8, [u8; 4], Instant)>,
 }
@@ -83,7 +83,7 @@ impl EepromController {
                     properties.eeprom_write_time * u64::from(nd21::PARAMETER_COUNT)
                 }
             };
-            Job {
+            EepromJob {
                 command,
                 address: memory.peek(BUFFER),
                 data: memory.peek(DATA),

@@ -139,13 +139,13 @@ mod tests {
     const COUNT: u16 = ram::UMDRIST;
 
     /// An oscilloscope that records [`COUNT`] and triggers on `iaist`.
-    struct Bench {
+    struct ScopeBench {
         cells: Cells,
         scope: Scope,
         scans: u32,
     }
 
-    impl Bench {
+    impl ScopeBench {
         fn new() -> Self {
             let mut cells = Cells::with_eeprom([0; 256]);
             let mut scope = Scope::default();
@@ -210,7 +210,7 @@ mod tests {
     /// 14.10.6.5: after power-up nothing is recorded.
     #[test]
     fn power_up_is_a_stopped_recording() {
-        let mut bench = Bench::new();
+        let mut bench = ScopeBench::new();
         assert_eq!(bench.status(), 0x80);
         let before = bench.cells.clone();
         assert!(!bench.scope.running(&bench.cells));
@@ -225,7 +225,7 @@ mod tests {
         let level = momentary_current_to_raw(Ratio::whole(-7), DriveType::Nd5610).unwrap();
         assert_eq!(trigger_level_to_raw(level), 0x63);
         for (status, near) in [(0x30, level - 1), (0x20, level + 1)] {
-            let mut bench = Bench::new();
+            let mut bench = ScopeBench::new();
             bench.cells.put(ram::SCOPE_LEVEL, 0x63);
             bench.load(status, -5_000);
             assert_eq!(bench.cells.byte(ram::SCOPE_DELAY), 46);
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn what_never_was_below_does_not_pass() {
         for (status, far, near) in [(0x30, 10, -10), (0x20, -10, 10)] {
-            let mut bench = Bench::new();
+            let mut bench = ScopeBench::new();
             bench.cells.put(ram::SCOPE_LEVEL, trigger_level_to_raw(0));
             bench.load(status, 0);
             for trigger in [far, 0, far] {
@@ -268,7 +268,7 @@ mod tests {
     /// 14.10.6.6: while the delay runs down, the trigger conditions are not checked.
     #[test]
     fn the_delay_comes_first() {
-        let mut bench = Bench::new();
+        let mut bench = ScopeBench::new();
         bench.cells.put(ram::SCOPE_LEVEL, trigger_level_to_raw(0));
         bench.load(0x30, -3 * 108);
         for (trigger, delay) in [(-1, 2), (1, 1), (-1, 0)] {
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn positive_delays() {
         for (delay_us, periods) in [(0, 0), (108, 1), (40_000, 370), (65_279 * 108, 65_279)] {
-            let mut bench = Bench::new();
+            let mut bench = ScopeBench::new();
             bench.cells.put(ram::SCOPE_LEVEL, trigger_level_to_raw(0));
             bench.load(0x30, delay_us);
             bench.scan(-1);
@@ -302,7 +302,7 @@ mod tests {
     fn time_base() {
         for timer0 in [0, 1, 3, 255] {
             let period = u32::from(timer0) + 1;
-            let mut bench = Bench::new();
+            let mut bench = ScopeBench::new();
             bench.cells.put(ram::SCOPE_TIMER0, timer0);
             bench.cells.put(ram::SCOPE_LEVEL, trigger_level_to_raw(0));
             bench.load(0x30, 0);
@@ -318,7 +318,7 @@ mod tests {
     /// 14.10.6.6: signal 1 at even addresses, 2 at odd ones; 14.10.6.1: only the low byte selects.
     #[test]
     fn two_signals() {
-        let mut bench = Bench::new();
+        let mut bench = ScopeBench::new();
         bench.cells.put(ram::SCOPE_SIGNAL1, 0x00);
         bench.cells.put(ram::SCOPE_SIGNAL2, 0xFF);
         bench.cells.put(0xFF00, 0x11);
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn buffer_order() {
         for pointer in 0..=u8::MAX {
-            let mut bench = Bench::new();
+            let mut bench = ScopeBench::new();
             bench.cells.put(ram::SCOPE_POINTER, pointer);
             bench.load(0x40, 17 * 108);
             assert_eq!(bench.finish(0), 256 + 17);
@@ -358,7 +358,7 @@ mod tests {
     /// finished recording.
     #[test]
     fn auto_trigger() {
-        let mut bench = Bench::new();
+        let mut bench = ScopeBench::new();
         for level in [0x00, 0x80, 0xFF] {
             bench.cells.put(ram::SCOPE_LEVEL, level);
             for scans in [256, 257, 1_000] {
@@ -378,7 +378,7 @@ mod tests {
     /// The choice for `scope_counter` = 0: no end.
     #[test]
     fn a_counter_that_was_not_loaded() {
-        let mut bench = Bench::new();
+        let mut bench = ScopeBench::new();
         bench.load(0x60, 0);
         bench.cells.put_word(ram::SCOPE_COUNTER, 0);
         (0..100_000).for_each(|_| bench.scan(0));

@@ -71,7 +71,7 @@ pub struct Settings {
 
 /// What happens by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Event {
+enum InverterEvent {
     /// The motor has come to rest, and the state ends with it.
     Standstill,
     /// 1625 has expired.
@@ -103,7 +103,7 @@ pub struct Inverter {
     /// The fault whose cause is there.
     cause: Option<u8>,
     /// What happens next by itself.
-    due: Option<(Instant, Event)>,
+    due: Option<(Instant, InverterEvent)>,
     now: Instant,
 }
 
@@ -366,14 +366,14 @@ impl Inverter {
         self.advance(self.now);
     }
 
-    fn next_event(&self) -> Option<(Instant, Event)> {
+    fn next_event(&self) -> Option<(Instant, InverterEvent)> {
         let standstill =
             machine::at_standstill(self.state, self.words.stw).and_then(|_| self.ramp.zero_at());
         let timeout = self.bus_timeout();
         let events = [
-            standstill.map(|at| (at, Event::Standstill)),
-            timeout.map(|at| (at, Event::BusTimeout)),
-            self.apart.map(|at| (at, Event::Apart)),
+            standstill.map(|at| (at, InverterEvent::Standstill)),
+            timeout.map(|at| (at, InverterEvent::BusTimeout)),
+            self.apart.map(|at| (at, InverterEvent::Apart)),
         ];
         events.into_iter().flatten().min_by_key(|(at, _)| *at)
     }
@@ -386,19 +386,19 @@ impl Inverter {
         (time != Span::ZERO).then_some(heard + time + more)
     }
 
-    fn happen(&mut self, event: Event) {
+    fn happen(&mut self, event: InverterEvent) {
         match event {
-            Event::Standstill => {
+            InverterEvent::Standstill => {
                 if let Some((_, state)) = machine::at_standstill(self.state, self.words.stw) {
                     self.state = state;
                 }
                 self.steer();
             }
-            Event::BusTimeout => {
+            InverterEvent::BusTimeout => {
                 self.heard = None;
                 self.fail(TIME_OUT);
             }
-            Event::Apart => {
+            InverterEvent::Apart => {
                 self.apart = None;
                 self.fail(TIME_OUT);
             }

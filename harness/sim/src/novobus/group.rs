@@ -5,7 +5,7 @@
 //! by their place alone. A group takes each byte once, when the first drive receives it. It gives the byte to no drive but the one that is
 //! addressed, at that drive's own time, and puts it on the link behind the group when the last drive sends it.
 //!
-//! Times are those of `Entry::home`: when a byte reaches the end of the ring. Bytes and [`Relay`] are those of the first drive.
+//! Times are those of `GroupByte::home`: when a byte reaches the end of the ring. Bytes and [`Relay`] are those of the first drive.
 //! With both, a byte has the same entry at every drive.
 //!
 //! A group ends at the first byte that its drives do not pass on in this way. Then each drive and each link gets the state that the
@@ -31,7 +31,7 @@ const SPENT: usize = 512;
 
 /// A byte on its way through a group.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct GroupByte {
     /// When it reaches the end of the ring.
     home: Instant,
     /// What the first drive receives.
@@ -51,7 +51,7 @@ struct Entry {
 /// No drive's number in a group: a ring has fewer.
 const NO_TURN: u8 = u8::MAX;
 
-impl Entry {
+impl GroupByte {
     /// What drive `number` of the group receives.
     #[inline]
     fn at(&self, number: u8) -> u8 {
@@ -84,7 +84,7 @@ pub(crate) struct Group {
     /// What the first drive keeps behind the last byte.
     relay: Relay,
     /// The bytes since the group was formed; where none is recorded, the last one that has left and those behind it.
-    entries: Vec<Entry>,
+    entries: Vec<GroupByte>,
     /// How many were before these.
     dropped: usize,
     /// How many have left the group, of all.
@@ -105,7 +105,7 @@ impl Group {
         now: Instant,
     ) -> Option<Self> {
         nodes.get(LEAST - 1)?;
-        let row = Row::of(nodes, links, now)?;
+        let row = GroupRow::of(nodes, links, now)?;
         let (nodes, links) = (&nodes[row.first..], &mut links[row.first..]);
         nodes.get(LEAST - 1)?;
         let last = nodes.len() - 1;
@@ -162,7 +162,7 @@ impl Group {
     }
 
     /// Byte `number`, counted from 0.
-    fn entry(&self, number: usize) -> Option<&Entry> {
+    fn entry(&self, number: usize) -> Option<&GroupByte> {
         self.entries.get(number.checked_sub(self.dropped)?)
     }
 
@@ -226,7 +226,13 @@ impl Group {
 
     /// A byte that arrives in normal mode.
     #[inline]
-    fn passed_on(&mut self, before: Passing, number: u8, at: Instant, byte: u8) -> Option<Entry> {
+    fn passed_on(
+        &mut self,
+        before: Passing,
+        number: u8,
+        at: Instant,
+        byte: u8,
+    ) -> Option<GroupByte> {
         let climbs = before.awaits_address();
         let byte = byte.wrapping_sub(if climbs { number } else { 0 });
         let relay = before.receive(byte)?;
@@ -237,7 +243,7 @@ impl Group {
             let at = at + self.byte_time * u64::from(drive - number);
             self.waiting.push(Reverse((at, self.count())));
         }
-        Some(Entry {
+        Some(GroupByte {
             home: self.home(number, at),
             byte,
             climbs,
@@ -251,13 +257,13 @@ impl Group {
 
     /// A byte that arrives in the error mode.
     #[inline(never)]
-    fn climbed(&self, before: Climb, number: u8, at: Instant, byte: u8) -> Option<Entry> {
+    fn climbed(&self, before: Climb, number: u8, at: Instant, byte: u8) -> Option<GroupByte> {
         let relay = before.behind(number).receive(byte)?.ahead(number);
         let remarks = relay.began_sequence() && usize::from(relay.from()) < self.places.len();
         if self.remarking && remarks {
             return None;
         }
-        Some(Entry {
+        Some(GroupByte {
             home: self.home(number, at),
             byte: byte.wrapping_sub(number),
             climbs: true,
@@ -380,7 +386,7 @@ impl Group {
     }
 
     /// The byte on the link to this place.
-    fn on_link(&self, place: usize, entry: &Entry) -> UnderWay {
+    fn on_link(&self, place: usize, entry: &GroupByte) -> UnderWay {
         let byte = entry.at(self.number(place));
         UnderWay::whole(entry.home - self.way_home(place), byte, true)
     }
@@ -423,7 +429,7 @@ impl Group {
 }
 
 /// Drives that can make a group.
-struct Row {
+struct GroupRow {
     /// The first of them, in the nodes from which they are taken. They end with the last node.
     first: usize,
     /// What is under way between them, the oldest first, each with the drive to which it is under way.
@@ -434,7 +440,7 @@ struct Row {
     newest: Option<Instant>,
 }
 
-impl Row {
+impl GroupRow {
     /// The longest row that ends with the last of `nodes`.
     fn of<D: Device>(nodes: &[RingNode<D>], links: &[Link], now: Instant) -> Option<Self> {
         let first = nodes.len().checked_sub(1)?;

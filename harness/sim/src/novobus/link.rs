@@ -3,7 +3,7 @@
 use crate::fault::{Flips, LinkFault};
 use crate::novobus::fault_plan::FaultPlan;
 use crate::novobus::uart::{self, Uart};
-use crate::novobus::under_way::{Bytes, UnderWay};
+use crate::novobus::under_way::{UnderWay, WireBytes};
 use crate::record::LineByte;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
@@ -12,7 +12,7 @@ use harness_proto::time::{Instant, Span};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 struct Opening {
     /// Bytes that have been sent and not been fetched.
-    sent: Bytes,
+    sent: WireBytes,
     /// When the last byte sent arrives there.
     last_arrival: Instant,
 }
@@ -25,7 +25,7 @@ pub struct Link {
     line_free: Instant,
     /// When the last byte arrived: bytes arrive one after another.
     last_arrival: Instant,
-    bytes: Bytes,
+    bytes: WireBytes,
     transmitted: u64,
     plan: FaultPlan<LinkFault>,
     cut: bool,
@@ -45,7 +45,7 @@ impl Link {
             byte_time,
             line_free: Instant::START,
             last_arrival: Instant::START,
-            bytes: Bytes::recorded(),
+            bytes: WireBytes::recorded(),
             transmitted: 0,
             plan: FaultPlan::default(),
             cut: false,

@@ -51,7 +51,7 @@ pub enum Fault {
 /// Where a drive stands in the byte stream (ND21 9.1).
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(u8)]
-enum State {
+enum ReferenceState {
     #[default]
     Sync,
     /// Net bytes that will follow the address byte, how many of them are process data.
@@ -114,7 +114,7 @@ impl Default for Memory {
 #[derive(Clone, Debug, Default)]
 pub struct Drive {
     memory: Memory,
-    state: State,
+    state: ReferenceState,
     /// An explicit address was seen, so `BusAddr` means something to a short telegram (ND21 9.2).
     address_valid: bool,
     /// First process data byte received, second one to be sent (ND21 9.4).
@@ -202,10 +202,10 @@ impl Drive {
 
     /// Treats the process data under way as received, and executes nothing (ND21 9.4).
     pub fn forget_process_data(&mut self) {
-        if let State::Net(left, process, addressed) = self.state {
+        if let ReferenceState::Net(left, process, addressed) = self.state {
             self.state = match left - process {
-                0 => State::Sync,
-                left => State::Net(left, 0, addressed),
+                0 => ReferenceState::Sync,
+                left => ReferenceState::Net(left, 0, addressed),
             };
         }
     }
@@ -213,7 +213,7 @@ impl Drive {
     /// Silence for 10 ms: the error mode, in which increments begin with the "*" (ND21 9.9).
     pub fn time_out(&mut self) {
         if !self.in_error() {
-            self.state = State::Error;
+            self.state = ReferenceState::Error;
             self.zeros_received = 0;
             self.preceding = false;
             self.matched = 0;
@@ -224,14 +224,14 @@ impl Drive {
     /// Whether the drive is in error mode (ND21 9.7).
     #[must_use]
     pub fn in_error(&self) -> bool {
-        matches!(self.state, State::Error)
+        matches!(self.state, ReferenceState::Error)
     }
 
     /// Takes one byte off the line, gives the byte sent for it; only PAUSE gets none (ND21 9, 9.2).
     #[inline]
     pub fn receive(&mut self, cell: Cell) -> Option<u8> {
         match self.state {
-            State::Error => Some(self.error_mode(cell)),
+            ReferenceState::Error => Some(self.error_mode(cell)),
             _ => self.normal_mode(cell),
         }
     }
@@ -239,21 +239,21 @@ impl Drive {
     #[inline(never)]
     fn normal_mode(&mut self, cell: Cell) -> Option<u8> {
         let reply = match (self.state, cell.byte) {
-            (State::Error, _) => Ok(self.error_mode(cell)),
+            (ReferenceState::Error, _) => Ok(self.error_mode(cell)),
             // ND21 9.7: parity and framing are checked by every drive, addressed or not.
             _ if cell.error => Err(0x0502),
-            (State::Sync, 0x80) => Ok(0x80),    // SYNCO
-            (State::Sync, 0x81) => return None, // PAUSE
-            (State::Sync, byte) => self.sync_byte(byte),
-            (State::Address(net, process), byte) => {
+            (ReferenceState::Sync, 0x80) => Ok(0x80), // SYNCO
+            (ReferenceState::Sync, 0x81) => return None, // PAUSE
+            (ReferenceState::Sync, byte) => self.sync_byte(byte),
+            (ReferenceState::Address(net, process), byte) => {
                 self.address_valid = true;
                 self.begin(byte.wrapping_add(1), net, process);
                 Ok(byte.wrapping_add(1))
             }
-            (State::Net(left, process, addressed), byte) => {
+            (ReferenceState::Net(left, process, addressed), byte) => {
                 self.state = match left {
-                    1 => State::Sync,
-                    _ => State::Net(left - 1, process.saturating_sub(1), addressed),
+                    1 => ReferenceState::Sync,
+                    _ => ReferenceState::Net(left - 1, process.saturating_sub(1), addressed),
                 };
                 match process {
                     // ND21 9.3: passed on, contents not checked.
@@ -266,7 +266,7 @@ impl Drive {
         Some(reply.unwrap_or_else(|code| {
             // ND21 14.10.1: the error code, high byte first.
             self.poke_word([0xFD, 0x82], code.to_be_bytes());
-            self.state = State::Error;
+            self.state = ReferenceState::Error;
             self.error_mode(cell)
         }))
     }
@@ -275,7 +275,7 @@ impl Drive {
     fn sync_byte(&mut self, byte: u8) -> Result<u8, u16> {
         let (net, process) = ((byte >> 1) & 7, (byte & 1) * 2);
         match byte & 0xF0 {
-            0x80 if net >= process => self.state = State::Address(net, process),
+            0x80 if net >= process => self.state = ReferenceState::Address(net, process),
             0xA0 if net >= process => self.begin(self.peek(BUS_ADDR), net, process),
             0xE0 if net >= process => self.begin(self.peek(BUS_ADDR).wrapping_add(1), net, process),
             _ => return Err(0x0504),
@@ -287,7 +287,7 @@ impl Drive {
     fn begin(&mut self, sum: u8, net: u8, process: u8) {
         self.poke(BUS_ADDR, sum);
         if net > 0 {
-            self.state = State::Net(net, process, self.address_valid && sum == 0);
+            self.state = ReferenceState::Net(net, process, self.address_valid && sum == 0);
         }
     }
 
@@ -400,7 +400,7 @@ impl Drive {
 
     /// After a reset and a check sequence all but the memory is as after power-up.
     fn restart(&mut self) {
-        self.state = State::Sync;
+        self.state = ReferenceState::Sync;
         self.address_valid = false;
         self.process = (0, 0);
         self.forget_half();

@@ -100,14 +100,14 @@ impl UnderWay {
 /// The bytes of a wire in the order in which they arrive: those under way, and in front of them, where a record is kept, those that have
 /// arrived. So a byte is written once and stays where it is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Bytes {
+pub(crate) struct WireBytes {
     bytes: Vec<UnderWay>,
     /// How many of them have arrived.
     arrived: usize,
     recording: bool,
 }
 
-impl Bytes {
+impl WireBytes {
     /// How many that have arrived are kept at most where no record is.
     const SPENT: usize = 128;
 

@@ -29,7 +29,7 @@ const SCAN: Span = Span::from_millis(1);
 const POWER_UP_POSITION: i32 = 0x86B9;
 
 /// The contents of all registers.
-type Cells = [u32; 256];
+type RegisterContents = [u32; 256];
 
 /// The simulated drive.
 #[derive(Clone, Debug)]
@@ -37,9 +37,9 @@ pub struct Drive {
     properties: Properties,
     /// The inputs; change them by [`Drive::set_inputs`].
     inputs: Inputs,
-    cells: Cells,
+    cells: RegisterContents,
     /// Levels 0 and 1; level 1 is empty at first.
-    eeprom: [Option<Arc<Cells>>; 2],
+    eeprom: [Option<Arc<RegisterContents>>; 2],
     /// On which it receives and sends now.
     identifiers: (u16, u16),
     /// On which it also receives now and sends single replies (88, 89), as the registers hold them; 0 is none.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 type Entry = (u8, u64, u64, u64);
 
 /// The contents of all registers, by number.
-type Cells = [u32; 256];
+type ModelContents = [u32; 256];
 
 /// The model.
 #[derive(Clone, Debug)]
@@ -21,8 +21,8 @@ pub struct Reference {
     p: Properties,
     /// What is connected.
     pub inputs: Inputs,
-    held: Cells,
-    store: [Option<Arc<Cells>>; 2],
+    held: ModelContents,
+    store: [Option<Arc<ModelContents>>; 2],
     rx: u32,
     tx: u32,
     second: (u32, u32),

@@ -1,7 +1,7 @@
 //! A drive that only passes bytes on (ND21 9.2, 9.3) or adds 1 to them in the error mode (9.7): its state follows from the bytes and
 //! its place.
 
-use super::{BusEnd, Reaction, Silence, State};
+use super::{BusEnd, BusEndState, LineSilence, Reaction};
 use crate::line::Received;
 use crate::novobus::address::passed_on;
 use crate::novobus::error_mode::{Climb, ErrorMode};
@@ -147,11 +147,15 @@ impl BusEnd {
     #[must_use]
     pub fn relay(&self, bus_addr: u8) -> Option<Relay> {
         let awaits = match &self.state {
-            State::Sync => Awaits::Sync,
-            State::Address(header) => Awaits::Address(*header),
-            State::Passing { left } | State::Addressed { left, .. } => Awaits::Net(*left),
-            State::Error(mode, Silence::None) => return self.climb(mode).map(Relay::Climbing),
-            State::Error(..) => return None,
+            BusEndState::Sync => Awaits::Sync,
+            BusEndState::Address(header) => Awaits::Address(*header),
+            BusEndState::Passing { left } | BusEndState::Addressed { left, .. } => {
+                Awaits::Net(*left)
+            }
+            BusEndState::Error(mode, LineSilence::None) => {
+                return self.climb(mode).map(Relay::Climbing);
+            }
+            BusEndState::Error(..) => return None,
         };
         let properties = &self.properties;
         let kept =
@@ -183,13 +187,13 @@ impl BusEnd {
             Relay::Passing(Passing { awaits, sum }) => {
                 self.short_address_valid = sum.is_some();
                 self.state = match awaits {
-                    Awaits::Sync => State::Sync,
-                    Awaits::Address(header) => State::Address(header),
-                    Awaits::Net(left) => State::Passing { left },
+                    Awaits::Sync => BusEndState::Sync,
+                    Awaits::Address(header) => BusEndState::Address(header),
+                    Awaits::Net(left) => BusEndState::Passing { left },
                 };
             }
             Relay::Climbing(climb) => {
-                if let State::Error(mode, _) = &mut self.state {
+                if let BusEndState::Error(mode, _) = &mut self.state {
                     mode.has_climbed(climb);
                 }
             }

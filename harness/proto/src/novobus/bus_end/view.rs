@@ -1,6 +1,6 @@
 //! Read-only view of a bus end (ND21 9.1-9.9).
 
-use super::{BusEnd, Net, Silence, State};
+use super::{BusEnd, BusEndState, LineSilence, Net};
 use crate::novobus::error_mode::ErrorMode;
 
 /// How long the line has been silent for a drive in the error mode (ND21 9.9).
@@ -43,10 +43,10 @@ impl BusEnd {
     #[inline]
     pub const fn remaining(&self) -> Option<Remaining> {
         let (net_bytes, process_data) = match &self.state {
-            State::Address(header) => (header.net_length(), header.process_data()),
-            State::Passing { left } => (*left, false),
-            State::Addressed { left, next } => (*left, matches!(next, Net::ProcessHigh)),
-            State::Sync | State::Error(..) => return None,
+            BusEndState::Address(header) => (header.net_length(), header.process_data()),
+            BusEndState::Passing { left } => (*left, false),
+            BusEndState::Addressed { left, next } => (*left, matches!(next, Net::ProcessHigh)),
+            BusEndState::Sync | BusEndState::Error(..) => return None,
         };
         Some(Remaining {
             net_bytes,
@@ -58,13 +58,13 @@ impl BusEnd {
     #[must_use]
     #[inline]
     pub const fn error_mode(&self) -> Option<(&ErrorMode, Silent)> {
-        let State::Error(mode, silence) = &self.state else {
+        let BusEndState::Error(mode, silence) = &self.state else {
             return None;
         };
         let silent = match silence {
-            Silence::None => Silent::No,
-            Silence::Waiting { .. } => Silent::Waiting,
-            Silence::Sending { .. } => Silent::Sending,
+            LineSilence::None => Silent::No,
+            LineSilence::Waiting { .. } => Silent::Waiting,
+            LineSilence::Sending { .. } => Silent::Sending,
         };
         Some((mode, silent))
     }

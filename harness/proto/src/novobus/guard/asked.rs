@@ -11,10 +11,10 @@ const MOST: usize = 4_096;
 
 /// Commands in the order in which they were sent.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SentCommands(VecDeque<Command>);
+pub(super) struct SentCommands(VecDeque<SentCommand>);
 
 #[derive(Clone, Copy, Debug)]
-struct Command {
+struct SentCommand {
     address: u8,
     act: DriveAct,
     /// How many reads of the EEPROM its drive had begun.
@@ -29,7 +29,7 @@ impl SentCommands {
     /// A command was sent to the drive of this address byte. False where more are not answered than are kept.
     pub(super) fn sent(&mut self, address: u8, act: DriveAct, known: &KnownDrive) -> bool {
         let reads = known.eeprom.reads();
-        self.0.push_back(Command {
+        self.0.push_back(SentCommand {
             address,
             act,
             reads,

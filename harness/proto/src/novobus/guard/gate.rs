@@ -29,7 +29,7 @@ use alloc::collections::BTreeSet;
 pub struct Guard {
     ring: RingSize,
     limits: Limits,
-    state: State,
+    state: GateState,
     /// Commands received in part, by the address byte that means their drive.
     halves: Box<[Half; 256]>,
     /// What is known of each drive, by the address byte that means it.
@@ -53,7 +53,7 @@ pub struct Guard {
 
 /// What the drives take the next byte for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
+enum GateState {
     Doubt(Doubt),
     /// A sync byte.
     Sync,
@@ -75,7 +75,7 @@ enum Process {
 }
 
 /// What becomes of a parameter byte.
-enum Parameter {
+enum ParameterEffect {
     /// A half command, with the byte.
     Half(Half),
     /// A command is complete.
@@ -91,7 +91,7 @@ impl Guard {
         Self {
             ring,
             limits,
-            state: State::Doubt(Doubt::default()),
+            state: GateState::Doubt(Doubt::default()),
             halves: Box::new([Half::default(); 256]),
             known: Box::new([KnownDrive::default(); 256]),
             listener: Listener::new(),
@@ -110,7 +110,7 @@ impl Guard {
     /// Assumes that every drive waits for a sync byte and has received nothing. This holds for newly created simulated drives and
     /// for no physical ring.
     pub fn assume_fresh(&mut self) {
-        self.state = State::Sync;
+        self.state = GateState::Sync;
         self.listener.start(None);
     }
 
@@ -202,38 +202,40 @@ impl Guard {
     /// Whether only the bytes of the recovery pass.
     #[must_use]
     pub const fn in_doubt(&self) -> bool {
-        matches!(self.state, State::Doubt(_)) && !self.limits.allow_everything()
+        matches!(self.state, GateState::Doubt(_)) && !self.limits.allow_everything()
     }
 
     /// Whether every drive waits for a sync byte, and none has a command in part, as far as the bytes that have passed tell.
     #[must_use]
     pub fn at_rest(&self) -> bool {
-        self.state == State::Sync && self.halves.iter().all(|half| half.sent().is_empty())
+        self.state == GateState::Sync && self.halves.iter().all(|half| half.sent().is_empty())
     }
 
     /// What the drives take the next byte for, as far as the bytes that have passed tell.
     #[must_use]
     pub fn stage(&self) -> Stage {
         match self.state {
-            State::Doubt(doubt) => match (doubt.cleared, doubt.matched > 0, doubt.zeros == ZEROS) {
-                (false, ..) => Stage::Doubt,
-                (true, false, false) => Stage::Cleared,
-                (true, false, true) => Stage::Zeros,
-                (true, true, true) => Stage::Sequence,
-                (true, true, false) => Stage::IdleSequence,
-            },
-            State::Sync => Stage::Sync,
-            State::Address(_) => Stage::Address,
-            State::Net {
+            GateState::Doubt(doubt) => {
+                match (doubt.cleared, doubt.matched > 0, doubt.zeros == ZEROS) {
+                    (false, ..) => Stage::Doubt,
+                    (true, false, false) => Stage::Cleared,
+                    (true, false, true) => Stage::Zeros,
+                    (true, true, true) => Stage::Sequence,
+                    (true, true, false) => Stage::IdleSequence,
+                }
+            }
+            GateState::Sync => Stage::Sync,
+            GateState::Address(_) => Stage::Address,
+            GateState::Net {
                 process: Process::High,
                 ..
             } => Stage::ProcessHigh,
-            State::Net {
+            GateState::Net {
                 process: Process::Low(_),
                 ..
             } => Stage::ProcessLow,
-            State::Net { key, .. } if key < FIRST_ADDRESS => Stage::Nobody,
-            State::Net { key, .. } => {
+            GateState::Net { key, .. } if key < FIRST_ADDRESS => Stage::Nobody,
+            GateState::Net { key, .. } => {
                 let sent = self.halves[usize::from(key)].sent();
                 match sent.first().and_then(|code| length(*code)) {
                     None => Stage::Command,
@@ -252,7 +254,7 @@ impl Guard {
 
     /// The drives may be in any state from now on: bytes were changed on their way, or a drive was switched on.
     pub fn doubt(&mut self) {
-        self.state = State::Doubt(Doubt::default());
+        self.state = GateState::Doubt(Doubt::default());
         self.silence.doubt();
         self.listener.lose();
         self.kept = None;
@@ -298,7 +300,7 @@ impl Guard {
 
     /// Whether a byte would be the first of a recovery, or one of its zeros.
     fn recovers(&self, byte: u8) -> bool {
-        byte == 0 && matches!(self.state, State::Sync | State::Doubt(_))
+        byte == 0 && matches!(self.state, GateState::Sync | GateState::Doubt(_))
     }
 
     /// Until when a drive may keep to itself what comes now.
@@ -336,7 +338,7 @@ impl Guard {
     /// The address byte of the telegram under way.
     fn address(&self) -> Option<u8> {
         match self.state {
-            State::Net { key, .. } => Some(key),
+            GateState::Net { key, .. } => Some(key),
             _ => None,
         }
     }
@@ -370,7 +372,7 @@ impl Guard {
         let shift = self.tails[0].shift(byte);
         let shift = shift.or_else(|| self.tails[1].shift(byte).filter(|_| byte != PAUSE));
         match (shift, self.state) {
-            (Some(0), State::Doubt(_)) | (None, _) => Ok(next),
+            (Some(0), GateState::Doubt(_)) | (None, _) => Ok(next),
             _ => Err(Cause::CheckSequence),
         }
     }
@@ -415,25 +417,27 @@ impl Guard {
         if let Some((key, act)) = next.act {
             self.note(key, act);
         }
-        let certain = !matches!(self.state, State::Doubt(_));
+        let certain = !matches!(self.state, GateState::Doubt(_));
         self.state = match (self.state, next.state) {
             // If no drive can be in the middle of a telegram, a bad byte does not start one.
-            (State::Doubt(doubt), _) if line_error => State::Doubt(Doubt {
+            (GateState::Doubt(doubt), _) if line_error => GateState::Doubt(Doubt {
                 cleared: doubt.cleared,
                 ..Doubt::default()
             }),
-            _ if line_error => State::Doubt(Doubt::default()),
+            _ if line_error => GateState::Doubt(Doubt::default()),
             // A drive in the error mode may take these for its neighbour's (ND21 9.7).
-            (_, state) if !matches!(state, State::Doubt(_)) && self.zeros >= UPSTREAM_ZEROS => {
-                State::Doubt(Doubt::default().with_zeros(self.zeros))
+            (_, state) if !matches!(state, GateState::Doubt(_)) && self.zeros >= UPSTREAM_ZEROS => {
+                GateState::Doubt(Doubt::default().with_zeros(self.zeros))
             }
             // Zeros that a telegram has swallowed belong to the 17 as well (ND21 9.8).
-            (before, State::Doubt(doubt)) if byte == 0 && !matches!(before, State::Doubt(_)) => {
-                State::Doubt(doubt.with_zeros(self.zeros))
+            (before, GateState::Doubt(doubt))
+                if byte == 0 && !matches!(before, GateState::Doubt(_)) =>
+            {
+                GateState::Doubt(doubt.with_zeros(self.zeros))
             }
             (_, state) => state,
         };
-        if certain && matches!(self.state, State::Doubt(_)) {
+        if certain && matches!(self.state, GateState::Doubt(_)) {
             self.listener.lose();
             self.doubt_commands();
         }
@@ -442,22 +446,22 @@ impl Guard {
     /// What follows behind a byte.
     fn follow(&self, byte: u8) -> Result<Next, Cause> {
         match self.state {
-            State::Doubt(doubt) => Ok(match doubt.follow(byte)? {
-                Some(doubt) => Next::to(State::Doubt(doubt)),
+            GateState::Doubt(doubt) => Ok(match doubt.follow(byte)? {
+                Some(doubt) => Next::to(GateState::Doubt(doubt)),
                 None => Next {
                     recovered: true,
-                    ..Next::to(State::Sync)
+                    ..Next::to(GateState::Sync)
                 },
             }),
-            State::Sync => self.sync_byte(byte),
-            State::Address(header) => {
+            GateState::Sync => self.sync_byte(byte),
+            GateState::Address(header) => {
                 self.may_have_process_data(header, byte)?;
                 Ok(Next {
                     kept: Some(Some(byte)),
                     ..Next::to(net(header, byte))
                 })
             }
-            State::Net { key, left, process } => {
+            GateState::Net { key, left, process } => {
                 let (process, next) = match process {
                     Process::High => {
                         // If zeros must end this telegram, the low byte is one of them.
@@ -475,22 +479,22 @@ impl Guard {
                 };
                 let state = if left > 1 {
                     let left = left - 1;
-                    State::Net { key, left, process }
+                    GateState::Net { key, left, process }
                 } else {
-                    State::Sync
+                    GateState::Sync
                 };
                 Ok(match next {
                     None => Next::to(state),
-                    Some(Parameter::Half(half)) => Next {
+                    Some(ParameterEffect::Half(half)) => Next {
                         half: Some((key, half)),
                         ..Next::to(state)
                     },
-                    Some(Parameter::Error) => Next::to(in_doubt(byte, false)),
-                    Some(Parameter::Complete(DriveAct::Reset)) => Next {
+                    Some(ParameterEffect::Error) => Next::to(in_doubt(byte, false)),
+                    Some(ParameterEffect::Complete(DriveAct::Reset)) => Next {
                         act: Some((key, DriveAct::Reset)),
                         ..Next::to(in_doubt(byte, true))
                     },
-                    Some(Parameter::Complete(act)) => Next {
+                    Some(ParameterEffect::Complete(act)) => Next {
                         half: Some((key, Half::default())),
                         act: Some((key, act)),
                         ..Next::to(state)
@@ -503,12 +507,12 @@ impl Guard {
     /// ND21 9.2.
     fn sync_byte(&self, byte: u8) -> Result<Next, Cause> {
         let header = match SyncByte::decode(byte) {
-            Ok(SyncByte::Synco | SyncByte::Pause) => return Ok(Next::to(State::Sync)),
+            Ok(SyncByte::Synco | SyncByte::Pause) => return Ok(Next::to(GateState::Sync)),
             Ok(SyncByte::Telegram(header)) => header,
             // No drive takes these for sync bytes, and they leave no telegram open.
             Err(_) if byte & 0x90 != 0x80 => {
                 let zeros = u8::from(byte == 0);
-                return Ok(Next::to(State::Doubt(Doubt {
+                return Ok(Next::to(GateState::Doubt(Doubt {
                     cleared: true,
                     zeros,
                     in_error_mode: true,
@@ -521,10 +525,10 @@ impl Guard {
             DriveAct::ProcessDataToCome.judge(&self.limits, &KnownDrive::default())?;
         }
         let key = match (header.addressing(), self.kept) {
-            (Addressing::AddressFollows, _) => return Ok(Next::to(State::Address(header))),
+            (Addressing::AddressFollows, _) => return Ok(Next::to(GateState::Address(header))),
             (Addressing::SameDrive, Some(kept)) => kept,
             (Addressing::NextDrive, Some(kept)) => kept.wrapping_add(1),
-            _ if header.net_length() == 0 => return Ok(Next::to(State::Sync)),
+            _ if header.net_length() == 0 => return Ok(Next::to(GateState::Sync)),
             (_, None) => return Err(Cause::NoAddress),
         };
         self.may_have_process_data(header, key)?;
@@ -543,15 +547,15 @@ impl Guard {
     }
 
     /// ND21 9.5, 9.6, chapter 10.
-    fn parameter(&self, key: u8, byte: u8) -> Result<Parameter, Cause> {
+    fn parameter(&self, key: u8, byte: u8) -> Result<ParameterEffect, Cause> {
         let half = self.halves[usize::from(key)];
         let sent = half.sent();
         if sent.is_empty() && byte == 0 {
-            return Ok(Parameter::Error);
+            return Ok(ParameterEffect::Error);
         }
         let Some(length) = length(sent.first().copied().unwrap_or(byte)) else {
             DriveAct::Unknown(byte).judge(&self.limits, self.known(key))?;
-            return Ok(Parameter::Error);
+            return Ok(ParameterEffect::Error);
         };
         if sent.len() < length {
             let half = half.with(byte);
@@ -570,23 +574,23 @@ impl Guard {
             {
                 act.judge(&self.limits, self.known(key))?;
             }
-            return Ok(Parameter::Half(half));
+            return Ok(ParameterEffect::Half(half));
         }
         let Some(act) = DriveAct::of(sent) else {
-            return Ok(Parameter::Error);
+            return Ok(ParameterEffect::Error);
         };
         // With a wrong checking byte too: a wrong drive may execute it.
         act.judge(&self.limits, self.known(key))?;
         Ok(match Checksum::over(sent).plus() == byte {
-            true => Parameter::Complete(act),
-            false => Parameter::Error,
+            true => ParameterEffect::Complete(act),
+            false => ParameterEffect::Error,
         })
     }
 }
 
 /// What a byte changes, if it passes.
 struct Next {
-    state: State,
+    state: GateState,
     half: Option<(u8, Half)>,
     kept: Option<Option<u8>>,
     /// A command that the drive of this address byte executes.
@@ -595,7 +599,7 @@ struct Next {
 }
 
 impl Next {
-    const fn to(state: State) -> Self {
+    const fn to(state: GateState) -> Self {
         Self {
             state,
             half: None,
@@ -607,8 +611,8 @@ impl Next {
 }
 
 /// Doubt that begins with this byte.
-fn in_doubt(byte: u8, behind_reset: bool) -> State {
-    State::Doubt(Doubt {
+fn in_doubt(byte: u8, behind_reset: bool) -> GateState {
+    GateState::Doubt(Doubt {
         zeros: u8::from(byte == 0),
         behind_reset,
         ..Doubt::default()
@@ -616,10 +620,10 @@ fn in_doubt(byte: u8, behind_reset: bool) -> State {
 }
 
 /// The net bytes of a telegram.
-fn net(header: TelegramHeader, key: u8) -> State {
+fn net(header: TelegramHeader, key: u8) -> GateState {
     match header.net_length() {
-        0 => State::Sync,
-        left => State::Net {
+        0 => GateState::Sync,
+        left => GateState::Net {
             key,
             left,
             process: if header.process_data() {

@@ -12,7 +12,7 @@ use alloc::boxed::Box;
 /// from their middle on, and take a byte for an answer that is none.
 #[derive(Clone, Debug)]
 pub(super) struct Listener {
-    stage: Stage,
+    stage: ListenerStage,
     /// The last address byte, counted up by "next" (9.2).
     kept: Option<u8>,
     /// Answers received in part, by the address byte that means their drive.
@@ -21,7 +21,7 @@ pub(super) struct Listener {
 
 /// What the next byte is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum ListenerStage {
     Lost,
     Sync,
     Address(TelegramHeader),
@@ -37,7 +37,7 @@ impl Listener {
     /// One that reads nothing yet.
     pub(super) fn new() -> Self {
         Self {
-            stage: Stage::Lost,
+            stage: ListenerStage::Lost,
             kept: None,
             halves: Box::new([Half::default(); 256]),
         }
@@ -46,7 +46,7 @@ impl Listener {
     /// Every drive waits for a sync byte, and nothing is on its way; `kept` is what a short address goes on from.
     pub(super) fn start(&mut self, kept: Option<u8>) {
         *self = Self {
-            stage: Stage::Sync,
+            stage: ListenerStage::Sync,
             kept,
             ..Self::new()
         };
@@ -54,7 +54,7 @@ impl Listener {
 
     /// Nothing is read before the next conversation.
     pub(super) fn lose(&mut self) {
-        self.stage = Stage::Lost;
+        self.stage = ListenerStage::Lost;
     }
 
     /// Takes a byte. Returns the answer that it completes, without its checking byte, and the address byte that was sent to its drive.
@@ -76,13 +76,13 @@ impl Listener {
             return Err(NotUnderstood);
         };
         Ok(match self.stage {
-            Stage::Lost => (Stage::Lost, None),
-            Stage::Sync => (self.sync_byte(byte)?, None),
-            Stage::Address(header) => {
+            ListenerStage::Lost => (ListenerStage::Lost, None),
+            ListenerStage::Sync => (self.sync_byte(byte)?, None),
+            ListenerStage::Address(header) => {
                 let address = byte.wrapping_sub(ring.drives());
                 (self.addressed(header, address), None)
             }
-            Stage::Net {
+            ListenerStage::Net {
                 address,
                 left,
                 process,
@@ -93,8 +93,8 @@ impl Listener {
                     _ => None,
                 };
                 let next = match left {
-                    1 => Stage::Sync,
-                    _ => Stage::Net {
+                    1 => ListenerStage::Sync,
+                    _ => ListenerStage::Net {
                         address,
                         left: left - 1,
                         process: process.saturating_sub(1),
@@ -106,29 +106,29 @@ impl Listener {
     }
 
     /// ND21 9.2.
-    fn sync_byte(&mut self, byte: u8) -> Result<Stage, NotUnderstood> {
+    fn sync_byte(&mut self, byte: u8) -> Result<ListenerStage, NotUnderstood> {
         let Ok(read) = SyncByte::decode(byte) else {
             return Err(NotUnderstood);
         };
         let SyncByte::Telegram(header) = read else {
-            return Ok(Stage::Sync);
+            return Ok(ListenerStage::Sync);
         };
         let address = match (header.addressing(), self.kept) {
-            (Addressing::AddressFollows, _) => return Ok(Stage::Address(header)),
+            (Addressing::AddressFollows, _) => return Ok(ListenerStage::Address(header)),
             (Addressing::SameDrive, Some(kept)) => kept,
             (Addressing::NextDrive, Some(kept)) => kept.wrapping_add(1),
-            (_, None) if header.net_length() == 0 => return Ok(Stage::Sync),
+            (_, None) if header.net_length() == 0 => return Ok(ListenerStage::Sync),
             (_, None) => return Err(NotUnderstood),
         };
         Ok(self.addressed(header, address))
     }
 
     /// The telegram of this drive.
-    fn addressed(&mut self, header: TelegramHeader, address: u8) -> Stage {
+    fn addressed(&mut self, header: TelegramHeader, address: u8) -> ListenerStage {
         self.kept = Some(address);
         match header.net_length() {
-            0 => Stage::Sync,
-            left => Stage::Net {
+            0 => ListenerStage::Sync,
+            left => ListenerStage::Net {
                 address,
                 left,
                 process: if header.process_data() { 2 } else { 0 },
@@ -156,7 +156,7 @@ impl Listener {
 }
 
 /// What comes next, and an answer that is complete.
-type Read = (Stage, Option<(u8, Half)>);
+type Read = (ListenerStage, Option<(u8, Half)>);
 
 /// A byte that does not come where every drive does as it should.
 struct NotUnderstood;

@@ -2,9 +2,9 @@
 
 use super::super::sync::SYNCO;
 use super::Master;
-use super::diagnosis::Cause;
+use super::diagnosis::DisturbanceSign;
 use super::event::Event;
-use super::in_flight::{BytePlace, ComposedByte, Owner, Slot};
+use super::in_flight::{BytePlace, ComposedByte, JobSlot, Owner};
 use super::job::Outcome;
 use super::recovery::Stumble;
 use crate::line::Received;
@@ -18,13 +18,13 @@ pub(super) struct Unconfirmed {
     high: u8,
     exchange: Option<(u8, u16)>,
     /// A job, and the last byte of its data.
-    read: Option<(Slot, u8)>,
-    doubt: Doubt,
+    read: Option<(JobSlot, u8)>,
+    doubt: DataDoubt,
 }
 
 /// Whether data wait for a byte that settles them, although one has come back right after them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Doubt {
+enum DataDoubt {
     #[default]
     None,
     /// That byte was not significant, and the next ones may not be either.
@@ -50,7 +50,7 @@ impl Unconfirmed {
     }
 
     /// The read that is settled by a byte that has come back right.
-    fn settled_read(&mut self, composed: &ComposedByte) -> Option<Slot> {
+    fn settled_read(&mut self, composed: &ComposedByte) -> Option<JobSlot> {
         let (slot, last) = self.read?;
         let same = composed.back == Some(last);
         self.settle(composed, same).then(|| {
@@ -61,20 +61,20 @@ impl Unconfirmed {
 
     fn settle(&mut self, composed: &ComposedByte, same: bool) -> bool {
         let known = composed.back.is_some_and(|back| back != 0);
-        if known && same && self.doubt == Doubt::None {
-            self.doubt = Doubt::Raised;
+        if known && same && self.doubt == DataDoubt::None {
+            self.doubt = DataDoubt::Raised;
         }
         if known && !same {
-            self.doubt = Doubt::None;
+            self.doubt = DataDoubt::None;
         }
         known && !same
     }
 
     /// Whether only another telegram can settle the data. Asks but once.
     pub(super) fn must_ask(&mut self) -> bool {
-        let raised = self.doubt == Doubt::Raised;
+        let raised = self.doubt == DataDoubt::Raised;
         if raised {
-            self.doubt = Doubt::Asked;
+            self.doubt = DataDoubt::Asked;
         }
         raised
     }
@@ -85,7 +85,7 @@ impl Master {
     #[inline]
     pub(super) fn take(&mut self, received: Received, now: Instant) {
         let Some(sent) = self.in_flight.pop() else {
-            self.disturb(Cause::Unasked, now);
+            self.disturb(DisturbanceSign::Unasked, now);
             self.see(received);
             return;
         };
@@ -110,13 +110,13 @@ impl Master {
         if right {
             self.episode.byte_was_right(self.ring);
         } else {
-            self.disturb(Cause::Wrong(sent), now);
+            self.disturb(DisturbanceSign::Wrong(sent), now);
             self.see(received);
         }
     }
 
     /// Takes a byte of a job's answer; false where it is wrong.
-    fn take_answer(&mut self, slot: Slot, byte: u8) -> bool {
+    fn take_answer(&mut self, slot: JobSlot, byte: u8) -> bool {
         let Some(entry) = self.store.get_mut(slot) else {
             return false;
         };
@@ -151,7 +151,7 @@ impl Master {
     }
 
     /// A job has run.
-    fn finish(&mut self, slot: Slot) {
+    fn finish(&mut self, slot: JobSlot) {
         let Some(entry) = self.store.remove(slot) else {
             return;
         };

@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::command::Kind;
 use super::super::sync::{Addressing, MAX_NET_LENGTH, SYNCO, SyncByte, TelegramHeader};
 use super::Master;
-use super::in_flight::{BytePlace, ComposedByte, Owner, Slot};
+use super::in_flight::{BytePlace, ComposedByte, JobSlot, Owner};
 use crate::time::Instant;
 
 /// Sync byte, address byte and the net bytes.
@@ -183,7 +183,7 @@ impl Master {
     }
 
     /// The job with the next byte for `drive`.
-    fn candidate(&self, drive: u8, order: Order) -> Option<Slot> {
+    fn candidate(&self, drive: u8, order: Order) -> Option<JobSlot> {
         let slot = match order {
             Order::All => self.store.first()?,
             Order::Drive => self.store.first_of(drive)?,

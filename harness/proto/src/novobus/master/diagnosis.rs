@@ -43,7 +43,7 @@ pub(super) enum Spelled {
 
 /// The first sign of a disturbance.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Cause {
+pub(super) enum DisturbanceSign {
     /// Another byte came than this one, or it was damaged.
     Wrong(ByteInFlight),
     /// This byte did not come.
@@ -54,7 +54,7 @@ pub(super) enum Cause {
     NotBack,
 }
 
-impl Cause {
+impl DisturbanceSign {
     /// The byte at which it began.
     pub(super) const fn sent(&self) -> Option<&ByteInFlight> {
         match self {
@@ -67,7 +67,7 @@ impl Cause {
 /// What is known about a disturbance.
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
-    cause: Cause,
+    cause: DisturbanceSign,
     /// The expected bytes, starting at the first wrong one.
     expected: Vec<Option<u8>>,
     /// The bytes that came, starting at the same place.
@@ -80,7 +80,10 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// A disturbance, with the bytes under way behind it.
-    pub(super) fn new<'a>(cause: Cause, behind: impl Iterator<Item = &'a ByteInFlight>) -> Self {
+    pub(super) fn new<'a>(
+        cause: DisturbanceSign,
+        behind: impl Iterator<Item = &'a ByteInFlight>,
+    ) -> Self {
         let all = cause
             .sent()
             .copied()
@@ -99,7 +102,7 @@ impl Evidence {
     }
 
     /// The first sign.
-    pub(super) fn cause(&self) -> &Cause {
+    pub(super) fn cause(&self) -> &DisturbanceSign {
         &self.cause
     }
 
@@ -186,15 +189,15 @@ impl Evidence {
         let missed = self.expected.first().copied().flatten();
         let came = self.received.first();
         let right = |byte: &u8| *byte != 0 && came.is_some_and(|received| received.is(*byte));
-        matches!(self.cause, Cause::Missed(_)) && missed.as_ref().is_some_and(right)
+        matches!(self.cause, DisturbanceSign::Missed(_)) && missed.as_ref().is_some_and(right)
     }
 
     /// The fault of a ring in which no drive is in the error mode.
     fn compare(&self, ring: RingSize, drive: Option<u8>) -> Fault {
         let first = self.received.first().map(|received| received.byte);
         match (&self.cause, first) {
-            (Cause::Unasked, _) => return Fault::Extra { bytes: 1 },
-            (Cause::NotBack, _) => {
+            (DisturbanceSign::Unasked, _) => return Fault::Extra { bytes: 1 },
+            (DisturbanceSign::NotBack, _) => {
                 let whole = |bytes: &[Received]| {
                     let pairs = bytes.iter().zip(SEQUENCE);
                     pairs.into_iter().all(|(received, byte)| received.is(byte))
@@ -202,8 +205,8 @@ impl Evidence {
                 let back = self.received.windows(SEQUENCE.len()).any(whole);
                 return if back { Fault::Late } else { Fault::Unclear };
             }
-            (Cause::Missed(_), _) if self.fit(0, 0) => return Fault::Late,
-            (Cause::Wrong(sent), Some(received)) if self.fit(1, 1) => {
+            (DisturbanceSign::Missed(_), _) if self.fit(0, 0) => return Fault::Late,
+            (DisturbanceSign::Wrong(sent), Some(received)) if self.fit(1, 1) => {
                 return match (sent.composed.place, sent.composed.back, drive) {
                     // The address byte comes back increased by the number of drives (9.3).
                     (BytePlace::Address, Some(expected), _) => Fault::WrongRingSize {

@@ -6,7 +6,7 @@ use crate::time::Instant;
 use alloc::collections::VecDeque;
 
 /// A job in the store.
-pub(super) type Slot = u16;
+pub(super) type JobSlot = u16;
 
 /// What a byte on the line is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) enum Owner {
     Idle,
     /// The telegram that counts the drives.
     Count,
-    Job(Slot),
+    Job(JobSlot),
     /// The exchange of process data with a drive.
     Exchange(u8),
 }

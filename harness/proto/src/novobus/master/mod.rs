@@ -88,10 +88,10 @@ use alloc::vec::Vec;
 use answers::Unconfirmed;
 use compose::Outgoing;
 use cycle::Cycle;
-use diagnosis::Cause;
+use diagnosis::DisturbanceSign;
 use event::Events;
 use in_flight::{ByteInFlight, BytePlace, ComposedByte, InFlight};
-use recovery::{Episode, LastSequence, State};
+use recovery::{Episode, LastSequence, RecoveryState};
 use store::Store;
 
 /// The master's end of one ring.
@@ -102,7 +102,7 @@ pub struct Master {
     byte_time: Span,
     /// From the beginning of a byte to when it must be back.
     patience: Span,
-    state: State,
+    state: RecoveryState,
     episode: Episode,
     store: Store,
     cycle: Cycle,
@@ -164,9 +164,9 @@ impl Master {
             byte_time,
             patience: byte_time * round + options.slack,
             state: if options.check_first {
-                State::resetting(1)
+                RecoveryState::resetting(1)
             } else {
-                State::counting()
+                RecoveryState::counting()
             },
             episode: Episode::default(),
             store: Store::new(ring, options.capacity),
@@ -220,7 +220,7 @@ impl Master {
     /// # Errors
     /// Why the job cannot be done: see [`Refused`].
     pub fn submit(&mut self, job: Job) -> Result<JobId, Refused> {
-        if let State::Stopped(stop) = self.state {
+        if let RecoveryState::Stopped(stop) = self.state {
             return Err(Refused::Stopped(stop));
         }
         job.check(self.ring)?;
@@ -282,21 +282,23 @@ impl Master {
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<u8> {
         let watched = match self.state {
-            State::Running | State::Counting { .. } => true,
-            State::Verifying { .. } => return self.transmit(ComposedByte::SYNCO, true, now),
-            State::Locating { .. } => false,
-            State::Resetting { next, bytes, watch } => {
+            RecoveryState::Running | RecoveryState::Counting { .. } => true,
+            RecoveryState::Verifying { .. } => {
+                return self.transmit(ComposedByte::SYNCO, true, now);
+            }
+            RecoveryState::Locating { .. } => false,
+            RecoveryState::Resetting { next, bytes, watch } => {
                 return self.reset_byte(next, bytes, watch, now);
             }
-            State::Draining { .. } | State::Stopped(_) => return None,
+            RecoveryState::Draining { .. } | RecoveryState::Stopped(_) => return None,
         };
         if watched && self.in_flight.is_full() {
             return None;
         }
         if self.outgoing.is_empty() {
             match &mut self.state {
-                State::Running => self.compose(now),
-                State::Counting { composed } if !*composed => {
+                RecoveryState::Running => self.compose(now),
+                RecoveryState::Counting { composed } if !*composed => {
                     *composed = true;
                     self.compose_count();
                 }
@@ -305,7 +307,7 @@ impl Master {
         }
         let composed = match self.outgoing.next() {
             Some(composed) => composed,
-            None if matches!(self.state, State::Running) && self.pauses > 0 => {
+            None if matches!(self.state, RecoveryState::Running) && self.pauses > 0 => {
                 self.pauses -= 1;
                 self.counters.idle += 1;
                 self.counters.sent += 1;
@@ -326,7 +328,7 @@ impl Master {
                 composed,
                 due: now + self.patience,
             });
-        } else if let State::Locating { evidence, .. } = &mut self.state {
+        } else if let RecoveryState::Locating { evidence, .. } = &mut self.state {
             evidence.expect(composed.back);
         }
         self.counters.sent += 1;
@@ -348,9 +350,9 @@ impl Master {
         self.counters.sent += 1;
         let next = next + 1;
         self.state = if next < bytes {
-            State::Resetting { next, bytes, watch }
+            RecoveryState::Resetting { next, bytes, watch }
         } else {
-            State::Verifying {
+            RecoveryState::Verifying {
                 watch,
                 heard: false,
                 last: match usize::from(bytes) > CHECK_SEQUENCE.len() {
@@ -373,20 +375,25 @@ impl Master {
         let silent = self.silent_until(now) >= TIME_OUT;
         self.last_heard = now;
         self.episode.heard_after(silent);
-        let works = matches!(self.state, State::Running | State::Counting { .. });
+        let works = matches!(
+            self.state,
+            RecoveryState::Running | RecoveryState::Counting { .. }
+        );
         if works && self.unheard && self.is_before(received) {
             return;
         }
         match &mut self.state {
-            State::Running | State::Counting { .. } => self.take(received, now),
-            State::Locating { evidence, .. } => {
+            RecoveryState::Running | RecoveryState::Counting { .. } => self.take(received, now),
+            RecoveryState::Locating { evidence, .. } => {
                 evidence.see(received);
                 if let Some(spelled) = evidence.settled(self.ring) {
                     self.located(spelled, now);
                 }
             }
-            State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
-            State::Draining { .. } | State::Stopped(_) => {}
+            RecoveryState::Resetting { .. } | RecoveryState::Verifying { .. } => {
+                self.verify(received)
+            }
+            RecoveryState::Draining { .. } | RecoveryState::Stopped(_) => {}
         }
     }
 
@@ -411,11 +418,11 @@ impl Master {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         match self.state {
-            State::Running | State::Counting { .. } => self.in_flight.due(),
-            State::Locating { until, .. }
-            | State::Draining { until }
-            | State::Verifying { until, .. } => Some(until),
-            State::Resetting { .. } | State::Stopped(_) => None,
+            RecoveryState::Running | RecoveryState::Counting { .. } => self.in_flight.due(),
+            RecoveryState::Locating { until, .. }
+            | RecoveryState::Draining { until }
+            | RecoveryState::Verifying { until, .. } => Some(until),
+            RecoveryState::Resetting { .. } | RecoveryState::Stopped(_) => None,
         }
     }
 
@@ -425,20 +432,20 @@ impl Master {
             return;
         }
         match &self.state {
-            State::Running | State::Counting { .. } => {
+            RecoveryState::Running | RecoveryState::Counting { .. } => {
                 if let Some(sent) = self.in_flight.pop() {
-                    self.disturb(Cause::Missed(sent), now);
+                    self.disturb(DisturbanceSign::Missed(sent), now);
                 }
             }
-            State::Locating { evidence, .. } => {
+            RecoveryState::Locating { evidence, .. } => {
                 let spelled = evidence.spelled(self.ring);
                 self.located(spelled, now);
             }
-            State::Draining { .. } => {
-                self.state = State::resetting(self.episode.sequences(self.ring));
+            RecoveryState::Draining { .. } => {
+                self.state = RecoveryState::resetting(self.episode.sequences(self.ring));
             }
-            State::Verifying { .. } => self.disturb(Cause::NotBack, now),
-            State::Resetting { .. } | State::Stopped(_) => {}
+            RecoveryState::Verifying { .. } => self.disturb(DisturbanceSign::NotBack, now),
+            RecoveryState::Resetting { .. } | RecoveryState::Stopped(_) => {}
         }
     }
 

@@ -3,7 +3,7 @@
 use super::super::address::RingSize;
 use super::super::check_sequence::{CHECK_SEQUENCE, SequenceProgress, SequenceWatch};
 use super::super::sync::SYNCO;
-use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
+use super::diagnosis::{DisturbanceSign, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
 use super::fault::{BusStop, Fault, RingLink};
 use super::in_flight::{BytePlace, Owner};
@@ -19,7 +19,7 @@ const DRAINING: Span = Span::from_millis(8);
 
 /// The state of a master, with its data.
 #[derive(Clone, Debug)]
-pub(super) enum State {
+pub(super) enum RecoveryState {
     Counting {
         composed: bool,
     },
@@ -49,7 +49,7 @@ pub(super) enum State {
     Stopped(BusStop),
 }
 
-impl State {
+impl RecoveryState {
     pub(super) const fn counting() -> Self {
         Self::Counting { composed: false }
     }
@@ -178,21 +178,23 @@ impl Episode {
 
 impl Master {
     /// Handles a disturbance: work stops, and the ring gets time to spell out an address.
-    pub(super) fn disturb(&mut self, cause: Cause, now: Instant) {
+    pub(super) fn disturb(&mut self, cause: DisturbanceSign, now: Instant) {
         if self.episode.attempts == 0 {
             self.counters.disturbed += 1;
         }
         match cause {
-            Cause::Missed(_) => self.episode.silent = true,
-            Cause::NotBack => {
-                if matches!(self.state, State::Verifying { heard: false, .. }) {
+            DisturbanceSign::Missed(_) => self.episode.silent = true,
+            DisturbanceSign::NotBack => {
+                if matches!(self.state, RecoveryState::Verifying { heard: false, .. }) {
                     self.episode.silent = true;
                 }
             }
-            Cause::Wrong(sent) => self.episode.count |= sent.composed.place == BytePlace::Address,
-            Cause::Unasked => {}
+            DisturbanceSign::Wrong(sent) => {
+                self.episode.count |= sent.composed.place == BytePlace::Address
+            }
+            DisturbanceSign::Unasked => {}
         }
-        if matches!(cause, Cause::Wrong(_) | Cause::Unasked) {
+        if matches!(cause, DisturbanceSign::Wrong(_) | DisturbanceSign::Unasked) {
             self.episode.silent |= self.episode.after_silence;
         }
         if self.episode.failures == 0 {
@@ -213,23 +215,23 @@ impl Master {
         if self.episode.silent {
             until += self.options.monitoring;
         }
-        self.state = State::Locating { evidence, until };
+        self.state = RecoveryState::Locating { evidence, until };
     }
 
     /// Keeps the byte at which it began.
     pub(super) fn see(&mut self, received: Received) {
-        if let State::Locating { evidence, .. } = &mut self.state {
+        if let RecoveryState::Locating { evidence, .. } = &mut self.state {
             evidence.see(received);
         }
     }
 
     /// The ring has spelled out an address, or its time is over.
     pub(super) fn located(&mut self, spelled: Spelled, now: Instant) {
-        let State::Locating { evidence, .. } = &self.state else {
+        let RecoveryState::Locating { evidence, .. } = &self.state else {
             return;
         };
         let job = match evidence.cause() {
-            Cause::Wrong(sent) => match sent.composed.owner {
+            DisturbanceSign::Wrong(sent) => match sent.composed.owner {
                 Owner::Job(slot) => self.store.get(slot).map(|job| (sent, job)),
                 _ => None,
             },
@@ -267,9 +269,9 @@ impl Master {
             // Sent long ago, unless the caller stopped polling.
             self.outgoing.clear();
             self.state = if failures == 1 {
-                State::resetting(1)
+                RecoveryState::resetting(1)
             } else {
-                State::Draining {
+                RecoveryState::Draining {
                     until: now + DRAINING,
                 }
             };
@@ -279,11 +281,11 @@ impl Master {
     /// Looks for the check sequence in the bytes that come back.
     pub(super) fn verify(&mut self, received: Received) {
         let (watch, last) = match &mut self.state {
-            State::Resetting { watch, .. } => {
+            RecoveryState::Resetting { watch, .. } => {
                 watch.see(received.byte, received.error.is_none());
                 return;
             }
-            State::Verifying {
+            RecoveryState::Verifying {
                 watch, heard, last, ..
             } => {
                 *heard = true;
@@ -312,7 +314,7 @@ impl Master {
     /// All drives are back in normal mode; the bytes sent after the sequence come next.
     fn came_back(&mut self) {
         if self.episode.count || !self.episode.ran {
-            self.state = State::counting();
+            self.state = RecoveryState::counting();
         } else {
             self.resume();
         }
@@ -325,7 +327,7 @@ impl Master {
         self.episode.silent = false;
         self.episode.count = false;
         self.last_addressed = None;
-        self.state = State::Running;
+        self.state = RecoveryState::Running;
         if attempts == 0 {
             return;
         }
@@ -363,7 +365,7 @@ impl Master {
             events.ended(job.id, outcome);
             false
         });
-        self.state = State::Stopped(stop);
+        self.state = RecoveryState::Stopped(stop);
         self.report(Event::Stopped(stop));
     }
 }

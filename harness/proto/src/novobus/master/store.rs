@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::checksum::Checksum;
 use super::super::command::{Kind, Layout, Reply};
 use super::super::properties::ReadLongAnswer;
-use super::in_flight::Slot;
+use super::in_flight::JobSlot;
 use super::job::{Data, Job, JobId};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -30,9 +30,9 @@ pub(super) struct Entry {
     pub(super) data: Data,
     /// All of the command was sent before, and its answer was lost.
     pub(super) perhaps_run: bool,
-    before: Option<Slot>,
-    behind: Option<Slot>,
-    behind_in_drive: Option<Slot>,
+    before: Option<JobSlot>,
+    behind: Option<JobSlot>,
+    behind_in_drive: Option<JobSlot>,
 }
 
 impl Entry {
@@ -66,12 +66,12 @@ impl Entry {
     }
 
     /// The next job in the order in which all came.
-    pub(super) fn behind(&self) -> Option<Slot> {
+    pub(super) fn behind(&self) -> Option<JobSlot> {
         self.behind
     }
 
     /// The next job of the same drive.
-    pub(super) fn behind_in_drive(&self) -> Option<Slot> {
+    pub(super) fn behind_in_drive(&self) -> Option<JobSlot> {
         self.behind_in_drive
     }
 
@@ -149,8 +149,8 @@ impl Entry {
 /// A list of jobs by its two ends.
 #[derive(Clone, Copy, Debug, Default)]
 struct List {
-    first: Option<Slot>,
-    last: Option<Slot>,
+    first: Option<JobSlot>,
+    last: Option<JobSlot>,
 }
 
 /// The jobs.
@@ -160,7 +160,7 @@ pub(super) struct Store {
     entries: Vec<Option<Entry>>,
     capacity: u16,
     /// Which of them are empty.
-    free: Vec<Slot>,
+    free: Vec<JobSlot>,
     next_id: u64,
     all: List,
     drives: Vec<List>,
@@ -186,7 +186,7 @@ impl Store {
     /// Adds a job after the others; `None` where there is no room.
     pub(super) fn add(&mut self, job: &Job, read_long: ReadLongAnswer) -> Option<JobId> {
         if self.free.is_empty() && self.entries.len() < usize::from(self.capacity) {
-            self.free.push(Slot::try_from(self.entries.len()).ok()?);
+            self.free.push(JobSlot::try_from(self.entries.len()).ok()?);
             self.entries.push(None);
         }
         let slot = self.free.pop()?;
@@ -197,25 +197,25 @@ impl Store {
         Some(id)
     }
 
-    pub(super) fn get(&self, slot: Slot) -> Option<&Entry> {
+    pub(super) fn get(&self, slot: JobSlot) -> Option<&Entry> {
         self.entries.get(usize::from(slot))?.as_ref()
     }
 
-    pub(super) fn get_mut(&mut self, slot: Slot) -> Option<&mut Entry> {
+    pub(super) fn get_mut(&mut self, slot: JobSlot) -> Option<&mut Entry> {
         self.entries.get_mut(usize::from(slot))?.as_mut()
     }
 
     /// The first job that has bytes to be composed.
-    pub(super) fn first(&self) -> Option<Slot> {
+    pub(super) fn first(&self) -> Option<JobSlot> {
         self.all.first
     }
 
     /// The first such job of a drive.
-    pub(super) fn first_of(&self, drive: u8) -> Option<Slot> {
+    pub(super) fn first_of(&self, drive: u8) -> Option<JobSlot> {
         self.drives.get(usize::from(drive))?.first
     }
 
-    fn link(&mut self, slot: Slot) {
+    fn link(&mut self, slot: JobSlot) {
         let before = self.all.last.replace(slot);
         match before.and_then(|before| self.get_mut(before)) {
             Some(before) => before.behind = Some(slot),
@@ -236,7 +236,7 @@ impl Store {
     }
 
     /// Takes a job that is composed whole out of both orders; it is the first one of its drive.
-    pub(super) fn unlink(&mut self, slot: Slot) {
+    pub(super) fn unlink(&mut self, slot: JobSlot) {
         let Some(entry) = self.get(slot) else { return };
         let (before, behind) = (entry.before, entry.behind);
         let (drive, behind_in_drive) = (usize::from(entry.drive), entry.behind_in_drive);
@@ -256,7 +256,7 @@ impl Store {
     }
 
     /// Removes a job that is in neither list any more.
-    pub(super) fn remove(&mut self, slot: Slot) -> Option<Entry> {
+    pub(super) fn remove(&mut self, slot: JobSlot) -> Option<Entry> {
         let entry = self.entries.get_mut(usize::from(slot))?.take()?;
         self.free.push(slot);
         Some(entry)
@@ -265,7 +265,7 @@ impl Store {
     /// Removes all jobs, oldest first, and adds those again, from their beginning, for which `keep` returns
     /// true. Returns how many of these had been begun.
     pub(super) fn restart(&mut self, mut keep: impl FnMut(&Entry) -> bool) -> u64 {
-        let mut slots: Vec<(JobId, Slot)> = (0..)
+        let mut slots: Vec<(JobId, JobSlot)> = (0..)
             .zip(&self.entries)
             .filter_map(|(slot, entry)| Some((entry.as_ref()?.id, slot)))
             .collect();

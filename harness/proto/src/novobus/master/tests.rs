@@ -1,7 +1,7 @@
 //! What a master sends, read back with the codec alone (ND21 9.1-9.5, 10); its jobs in their two orders;
 //! and what it calls a fault.
 
-use super::diagnosis::{Cause, Evidence, Spelled};
+use super::diagnosis::{DisturbanceSign, Evidence, Spelled};
 use super::in_flight::{ByteInFlight, ComposedByte};
 use super::store::Store;
 use super::*;
@@ -249,7 +249,7 @@ fn an_address_is_believed_when_it_stays() {
         due: Instant::START,
     };
     let settled = |bytes: &[u8]| {
-        let mut evidence = Evidence::new(Cause::Wrong(sent), [].into_iter());
+        let mut evidence = Evidence::new(DisturbanceSign::Wrong(sent), [].into_iter());
         let mut settled = None;
         for byte in bytes {
             evidence.see(Received::good(*byte));
@@ -284,7 +284,7 @@ fn a_late_byte_is_no_silence() {
         (&[0x80, 0x80][..], Fault::Damaged(link)),
         (&[][..], Fault::Broken(link)),
     ] {
-        let mut evidence = Evidence::new(Cause::Missed(sent), [].into_iter());
+        let mut evidence = Evidence::new(DisturbanceSign::Missed(sent), [].into_iter());
         for byte in [before, &[0; 25], &[1; 10]].concat() {
             evidence.see(Received::good(byte));
         }

@@ -68,7 +68,7 @@ pub struct Master {
 struct Current {
     id: JobId,
     job: Job,
-    phase: Phase,
+    phase: JobPhase,
     /// The step of a start-up.
     step: usize,
     tries: u8,
@@ -77,7 +77,7 @@ struct Current {
 
 /// What a job waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum JobPhase {
     /// Its frame is to be sent.
     Send(Request),
     /// Its frame is to be sent, but not before.
@@ -94,7 +94,7 @@ enum Phase {
 
 /// A step of a start-up (ex 11, ex 12).
 #[derive(Clone, Copy, Debug)]
-enum Step {
+enum StartUpStep {
     /// Asks until the register is 1.
     Until(u8),
     Write(u8, u16),
@@ -105,13 +105,13 @@ enum Step {
 }
 
 /// Ready, lock, no command, hardware enable closed, release. A lock keeps the set points, so they are written first.
-const START_UP: [Step; 6] = [
-    Step::Until(0xE2),
-    Step::Lock,
-    Step::Write(0x31, 0),
-    Step::Write(0x90, 0),
-    Step::Until(0xE8),
-    Step::Release,
+const START_UP: [StartUpStep; 6] = [
+    StartUpStep::Until(0xE2),
+    StartUpStep::Lock,
+    StartUpStep::Write(0x31, 0),
+    StartUpStep::Write(0x90, 0),
+    StartUpStep::Until(0xE8),
+    StartUpStep::Release,
 ];
 
 impl Master {
@@ -183,9 +183,9 @@ impl Master {
         }
         let current = self.current.as_mut()?;
         let request = match current.phase {
-            Phase::Send(request) => request,
-            Phase::Rest(request, at) if at <= now => request,
-            Phase::Rest(..) | Phase::Reply { .. } => return None,
+            JobPhase::Send(request) => request,
+            JobPhase::Rest(request, at) if at <= now => request,
+            JobPhase::Rest(..) | JobPhase::Reply { .. } => return None,
         };
         let frame = request.encode(self.rx.0).ok()?;
         self.transmitted(request, now);
@@ -203,7 +203,7 @@ impl Master {
         self.current = Some(Current {
             id,
             job,
-            phase: Phase::Send(first),
+            phase: JobPhase::Send(first),
             step: 0,
             tries: 0,
             begun: now,
@@ -216,10 +216,10 @@ impl Master {
             data: Data::Short(value),
         };
         match START_UP[step] {
-            Step::Until(register) => Request::Read { register },
-            Step::Write(register, value) => short(register, value),
-            Step::Lock => short(0x51, self.mode & MODE_EVENT | MODE_LOCK),
-            Step::Release => short(0x51, self.mode & MODE_EVENT),
+            StartUpStep::Until(register) => Request::Read { register },
+            StartUpStep::Write(register, value) => short(register, value),
+            StartUpStep::Lock => short(0x51, self.mode & MODE_EVENT | MODE_LOCK),
+            StartUpStep::Release => short(0x51, self.mode & MODE_EVENT),
         }
     }
 
@@ -231,7 +231,7 @@ impl Master {
                 let written = self.written();
                 if let Some(current) = &mut self.current {
                     current.tries += 1;
-                    current.phase = Phase::Reply {
+                    current.phase = JobPhase::Reply {
                         register,
                         until,
                         asked: request,
@@ -244,7 +244,7 @@ impl Master {
                 self.slots.stop(register, now);
                 if let Some(current) = &mut self.current {
                     current.tries += 1;
-                    current.phase = Phase::Reply {
+                    current.phase = JobPhase::Reply {
                         register,
                         until: until + Span::from_millis(every.into()),
                         asked: request,
@@ -274,7 +274,7 @@ impl Master {
         if self.options.read_back && holds {
             if let Some(current) = &mut self.current {
                 current.tries = 0;
-                current.phase = Phase::Send(Request::Read { register });
+                current.phase = JobPhase::Send(Request::Read { register });
             }
         } else {
             self.done(Outcome::Sent, now);
@@ -320,7 +320,7 @@ impl Master {
             current.step = next;
             current.tries = 0;
             current.begun = now;
-            current.phase = Phase::Send(request);
+            current.phase = JobPhase::Send(request);
         }
     }
 
@@ -386,7 +386,7 @@ impl Master {
         let Some(current) = &self.current else {
             return false;
         };
-        let Phase::Reply {
+        let JobPhase::Reply {
             register, written, ..
         } = current.phase
         else {
@@ -432,7 +432,7 @@ impl Master {
                 register: reply.register,
             };
             current.tries = 0;
-            current.phase = Phase::Rest(again, now + POLL);
+            current.phase = JobPhase::Rest(again, now + POLL);
         }
     }
 
@@ -440,9 +440,9 @@ impl Master {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let job = match self.current.as_ref().map(|current| current.phase) {
-            Some(Phase::Reply { until, .. }) => Some(until),
-            Some(Phase::Rest(_, at)) => Some(at),
-            Some(Phase::Send(_)) | None => None,
+            Some(JobPhase::Reply { until, .. }) => Some(until),
+            Some(JobPhase::Rest(_, at)) => Some(at),
+            Some(JobPhase::Send(_)) | None => None,
         };
         let slot = self.slots.next_missing(self.options.cycle_tolerance);
         [job, slot].into_iter().flatten().min()
@@ -456,14 +456,14 @@ impl Master {
         let Some(current) = &mut self.current else {
             return;
         };
-        let Phase::Reply { until, asked, .. } = current.phase else {
+        let JobPhase::Reply { until, asked, .. } = current.phase else {
             return;
         };
         if until > now {
             return;
         }
         if current.tries <= self.options.repeats {
-            current.phase = Phase::Send(asked);
+            current.phase = JobPhase::Send(asked);
             // Behind a write to 68 the old and the new identifier are tried in turn.
             if let Some(other) = self.rx.1 {
                 self.rx = (other, Some(self.rx.0));

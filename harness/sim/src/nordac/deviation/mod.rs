@@ -48,7 +48,7 @@ pub static DEVIATIONS: DeviationTable<Injection> =
 
 /// What a deviant drive remembers.
 #[derive(Clone, Debug, Default)]
-struct Memory {
+struct SlaveMemory {
     /// The reply before the present one.
     reply: Vec<u8>,
     /// The inputs of the exchange before the present one.
@@ -62,7 +62,7 @@ struct Memory {
 /// What a deviation knows.
 struct Context<'a> {
     drive: &'a Drive,
-    memory: &'a Memory,
+    memory: &'a SlaveMemory,
     /// The request as it is on the line.
     request: &'a Parts,
 }
@@ -83,7 +83,7 @@ pub struct Deviant {
     drive: Drive,
     deviation: Option<&'static Deviation>,
     collector: Collector,
-    memory: Memory,
+    memory: SlaveMemory,
     /// The replies that wait, in order of time.
     replies: Vec<(Instant, Vec<u8>)>,
 }
@@ -96,7 +96,7 @@ impl Deviant {
             collector: Collector::new(drive.rate()),
             drive,
             deviation,
-            memory: Memory::default(),
+            memory: SlaveMemory::default(),
             replies: Vec::new(),
         }
     }

@@ -72,7 +72,7 @@ impl<'a> Arbitrary<'a> for Operation {
 
 /// The drive and the model, at the same time.
 #[derive(Clone, Debug)]
-struct Pair {
+struct SlavePair {
     drive: Drive,
     reference: ReferenceSlave,
     /// The line is idle since then, and both have advanced to it.
@@ -83,7 +83,7 @@ struct Pair {
 }
 
 /// The defaults, and each other value of each open point that the reference model knows.
-static VARIANTS: LazyLock<Vec<Pair>> = LazyLock::new(|| {
+static VARIANTS: LazyLock<Vec<SlavePair>> = LazyLock::new(|| {
     let mut all = vec![Properties::default()];
     for property in PROPERTIES {
         let words: Vec<String> = match property.accepts {
@@ -100,7 +100,7 @@ static VARIANTS: LazyLock<Vec<Pair>> = LazyLock::new(|| {
             }
         }
     }
-    all.into_iter().map(Pair::new).collect()
+    all.into_iter().map(SlavePair::new).collect()
 });
 
 /// The first byte chooses the variant of the drive; the others are operations of twelve bytes.
@@ -151,7 +151,7 @@ fn watched(data: &[u8], reached: &mut impl FnMut(Cell)) {
     }
 }
 
-impl Pair {
+impl SlavePair {
     fn new(properties: Properties) -> Self {
         let at = |number, set, value| (number, Index { element: 0, set }, value);
         let setup = InverterSetup {

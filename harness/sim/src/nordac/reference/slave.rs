@@ -19,7 +19,7 @@ const SET_PRM: u8 = 61;
 const CHK_CFG: u8 = 62;
 
 /// What a service gives.
-enum Reply {
+enum ServiceReply {
     /// SD1 with FC 03.
     Rs,
     /// E5.
@@ -222,16 +222,16 @@ impl ReferenceSlave {
         let reply = if sends {
             self.service(at, request)
         } else {
-            Reply::Rs
+            ServiceReply::Rs
         };
         let octets = match reply {
-            Reply::Rs => self.short(request.sa, 3),
-            Reply::Sc => Bytes::of(&[&[0xE5]]),
-            Reply::Inputs(data) => {
+            ServiceReply::Rs => self.short(request.sa, 3),
+            ServiceReply::Sc => Bytes::of(&[&[0xE5]]),
+            ServiceReply::Inputs(data) => {
                 let fc = if self.diagnosis_waits { 0x0A } else { 0x08 };
                 long(request.sa, self.address, fc, &data)
             }
-            Reply::Data(data) => {
+            ServiceReply::Data(data) => {
                 let saps = [request.ssap.unwrap_or(0), request.dsap.unwrap_or(0)];
                 let all = Bytes::of(&[&saps, &data]);
                 long(request.sa | 0x80, self.address | 0x80, 0x08, &all)
@@ -260,7 +260,7 @@ impl ReferenceSlave {
         self.wait_prm();
     }
 
-    fn service(&mut self, at: Instant, request: &Request<'_>) -> Reply {
+    fn service(&mut self, at: Instant, request: &Request<'_>) -> ServiceReply {
         let Request {
             sa,
             dsap,
@@ -272,31 +272,31 @@ impl ReferenceSlave {
         let of_master = self.master == Some(sa);
         match (dsap, ssap) {
             (None, None) if exchanges && of_master => self.exchange(at, data),
-            (None, _) | (_, None) => Reply::Rs,
+            (None, _) | (_, None) => ServiceReply::Rs,
             (Some(SET_PRM), _) => self.set_prm(at, sa, data),
             (Some(CHK_CFG), _) => self.chk_cfg(of_master, data),
-            _ if !data.is_empty() => Reply::Rs,
-            (Some(GET_CFG), _) => Reply::Data(Bytes::of(&[self.ppo.cfg()])),
-            (Some(SLAVE_DIAG), _) => Reply::Data(self.slave_diag(of_master)),
-            (Some(RD_INP), _) if exchanges => Reply::Data(self.read_inputs(at)),
-            (Some(RD_OUTP), _) if exchanges => Reply::Data(self.outputs),
-            _ => Reply::Rs,
+            _ if !data.is_empty() => ServiceReply::Rs,
+            (Some(GET_CFG), _) => ServiceReply::Data(Bytes::of(&[self.ppo.cfg()])),
+            (Some(SLAVE_DIAG), _) => ServiceReply::Data(self.slave_diag(of_master)),
+            (Some(RD_INP), _) if exchanges => ServiceReply::Data(self.read_inputs(at)),
+            (Some(RD_OUTP), _) if exchanges => ServiceReply::Data(self.outputs),
+            _ => ServiceReply::Rs,
         }
     }
 
-    fn set_prm(&mut self, at: Instant, sa: u8, data: &[u8]) -> Reply {
+    fn set_prm(&mut self, at: Instant, sa: u8, data: &[u8]) -> ServiceReply {
         if self.state != 'W' && self.master != Some(sa) {
             return if self.p.foreign_prm.word() == "rs" {
-                Reply::Rs
+                ServiceReply::Rs
             } else {
-                Reply::Sc
+                ServiceReply::Sc
             };
         }
         self.prm_fault = false;
         let &[status, wd1, wd2, tsdr, high, low, group, ref user @ ..] = data else {
             self.prm_fault = true;
             self.wait_prm();
-            return Reply::Sc;
+            return ServiceReply::Sc;
         };
         let (lock, unlock, watched) = (status & 0x80 != 0, status & 0x40 != 0, status & 8 != 0);
         if unlock {
@@ -309,7 +309,7 @@ impl ReferenceSlave {
             if (high, low) != (0x75, 0x31) || wrong_user || no_time {
                 self.prm_fault = true;
                 self.wait_prm();
-                return Reply::Sc;
+                return ServiceReply::Sc;
             }
             self.take_delay(tsdr);
             self.state = 'C';
@@ -320,7 +320,7 @@ impl ReferenceSlave {
             let time = Span::from_millis(10 * u64::from(wd1) * u64::from(wd2));
             self.watchdog = watched.then(|| (time, at + time));
         }
-        Reply::Sc
+        ServiceReply::Sc
     }
 
     fn take_delay(&mut self, tsdr: u8) {
@@ -329,11 +329,11 @@ impl ReferenceSlave {
         }
     }
 
-    fn chk_cfg(&mut self, of_master: bool, data: &[u8]) -> Reply {
+    fn chk_cfg(&mut self, of_master: bool, data: &[u8]) -> ServiceReply {
         match self.state {
-            'W' if self.p.chk_cfg_early.word() == "sc" => return Reply::Sc,
-            'W' => return Reply::Rs,
-            _ if !of_master => return Reply::Rs,
+            'W' if self.p.chk_cfg_early.word() == "sc" => return ServiceReply::Sc,
+            'W' => return ServiceReply::Rs,
+            _ if !of_master => return ServiceReply::Rs,
             _ => self.cfg_fault = false,
         }
         if data != self.ppo.cfg() {
@@ -343,7 +343,7 @@ impl ReferenceSlave {
             self.state = 'D';
             self.forget_data();
         }
-        Reply::Sc
+        ServiceReply::Sc
     }
 
     fn wait_prm(&mut self) {
@@ -386,12 +386,12 @@ impl ReferenceSlave {
         Bytes::of(&[&[first, second, 0, master, 0x75, 0x31], block])
     }
 
-    fn exchange(&mut self, at: Instant, data: &[u8]) -> Reply {
+    fn exchange(&mut self, at: Instant, data: &[u8]) -> ServiceReply {
         if data.len() != self.ppo.octets() {
             if self.p.leave_dx_wrong_length.word() == "rs-and-wait-prm" {
                 self.wait_prm();
             }
-            return Reply::Rs;
+            return ServiceReply::Rs;
         }
         // Apart, module and inverter exchange nothing.
         if let (None, Some((exchanges, task, answer))) = (&self.apart, self.due) {
@@ -411,7 +411,7 @@ impl ReferenceSlave {
         } else {
             self.put_out(at, data);
         }
-        Reply::Inputs(inputs)
+        ServiceReply::Inputs(inputs)
     }
 
     /// Outputs become effective.

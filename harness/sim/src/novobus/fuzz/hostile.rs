@@ -36,7 +36,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let Ok(size) = RingSize::new(u64::from(drives % 8) + 1) else {
         return;
     };
-    let mut play = Play::new(size);
+    let mut play = HostilePlay::new(size);
     let steps = data.iter().take(LONGEST).copied();
     for byte in steps.chain(std::iter::repeat_n(0xFF, SILENCE)) {
         play.step(byte, notes);
@@ -48,7 +48,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     assert!(open == 0, "{open} jobs never ended");
 }
 
-struct Play {
+struct HostilePlay {
     size: RingSize,
     master: Master,
     now: Instant,
@@ -60,7 +60,7 @@ struct Play {
     open: Vec<(JobId, Kind, Phase)>,
 }
 
-impl Play {
+impl HostilePlay {
     fn new(size: RingSize) -> Self {
         Self {
             size,

@@ -55,7 +55,7 @@ impl Deviation {
 
 /// What a deviant drive remembers.
 #[derive(Clone, Debug, Default)]
-struct Memory {
+struct DriveMemory {
     /// Frames heard, the present one included.
     heard: u64,
     /// Frames sent.
@@ -67,7 +67,7 @@ struct Memory {
 /// A frame that a deviant drive hears.
 struct Hearing<'a> {
     drive: &'a Drive,
-    memory: &'a Memory,
+    memory: &'a DriveMemory,
     frame: Frame,
     /// The identifier to which the drive listens.
     rx: u16,
@@ -135,7 +135,7 @@ impl Hearing<'_> {
 /// A frame that a deviant drive sends.
 struct Sending<'a> {
     drive: &'a Drive,
-    memory: &'a Memory,
+    memory: &'a DriveMemory,
     waiting: &'a Waiting,
     reply: Reply,
     tx: u16,
@@ -182,7 +182,7 @@ impl Sending<'_> {
 pub struct Deviant {
     drive: Drive,
     deviation: Option<&'static Deviation>,
-    memory: Memory,
+    memory: DriveMemory,
     /// Frames already sent of those that stand for the drive's next one.
     part: usize,
 }
@@ -194,7 +194,7 @@ impl Deviant {
         Self {
             drive,
             deviation,
-            memory: Memory::default(),
+            memory: DriveMemory::default(),
             part: 0,
         }
     }

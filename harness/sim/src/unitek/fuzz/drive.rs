@@ -24,12 +24,12 @@ const HOMING: Span = Span::from_millis(5);
 /// What happens to the drive, and how many milliseconds pass after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Operation {
-    what: What,
+    what: DriveOperation,
     wait: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
+enum DriveOperation {
     /// A frame to the identifier that the drive receives on now.
     ToDrive([u8; 8], usize),
     /// A frame to the identifier that it was delivered with.
@@ -64,14 +64,14 @@ impl<'a> Arbitrary<'a> for Operation {
         };
         let data = [register, a, b, c, d, 7, 8, 9];
         let what = match what >> 4 {
-            0x0..=0x7 => What::ToDrive(data, len),
-            0x8..=0xA => What::ToDelivered(data, len),
-            0xB => What::Elsewhere(identifier(value), data, len),
-            0xC => What::Remote(len),
-            0xD => What::Switch(low % Inputs::SWITCHES.len(), register & 1 != 0),
-            0xE => What::Force(low % Inputs::FORCED.len(), Some(value)),
-            0xF if low == 0xF => What::Time(u64::from(a >> 2)),
-            _ => What::Force(low % Inputs::FORCED.len(), None),
+            0x0..=0x7 => DriveOperation::ToDrive(data, len),
+            0x8..=0xA => DriveOperation::ToDelivered(data, len),
+            0xB => DriveOperation::Elsewhere(identifier(value), data, len),
+            0xC => DriveOperation::Remote(len),
+            0xD => DriveOperation::Switch(low % Inputs::SWITCHES.len(), register & 1 != 0),
+            0xE => DriveOperation::Force(low % Inputs::FORCED.len(), Some(value)),
+            0xF if low == 0xF => DriveOperation::Time(u64::from(a >> 2)),
+            _ => DriveOperation::Force(low % Inputs::FORCED.len(), None),
         };
         Ok(Self {
             what,
@@ -207,17 +207,17 @@ impl Pair {
         Instant::START + Span::from_millis(self.now)
     }
 
-    fn happens(&mut self, what: What, reached: &mut impl FnMut(Cell)) {
+    fn happens(&mut self, what: DriveOperation, reached: &mut impl FnMut(Cell)) {
         let rx = self.drive.identifiers().0;
         let id = Id::base(rx).or(Id::base(DEFAULT_RX));
         let frame = match (what, id) {
-            (What::ToDrive(data, len), Some(id)) => Frame::new(id, &data[..len]),
-            (What::ToDelivered(data, len), _) => Frame::base(DEFAULT_RX, &data[..len]),
-            (What::Elsewhere(id, data, len), _) => Frame::new(id, &data[..len]),
-            (What::Remote(len), Some(id)) => Frame::remote(id, len),
-            (What::Switch(number, on), _) => return self.switch(number, on, reached),
-            (What::Force(number, raw), _) => return self.force(number, raw, reached),
-            (What::Time(millis), _) => return self.wait(millis, reached),
+            (DriveOperation::ToDrive(data, len), Some(id)) => Frame::new(id, &data[..len]),
+            (DriveOperation::ToDelivered(data, len), _) => Frame::base(DEFAULT_RX, &data[..len]),
+            (DriveOperation::Elsewhere(id, data, len), _) => Frame::new(id, &data[..len]),
+            (DriveOperation::Remote(len), Some(id)) => Frame::remote(id, len),
+            (DriveOperation::Switch(number, on), _) => return self.switch(number, on, reached),
+            (DriveOperation::Force(number, raw), _) => return self.force(number, raw, reached),
+            (DriveOperation::Time(millis), _) => return self.wait(millis, reached),
             (_, None) => return,
         };
         if let Ok(frame) = frame {
@@ -490,13 +490,19 @@ mod tests {
             read.expect("seven bytes")
         };
         let read = operation([3, 0x3D, 0x40, 0, 0, 0, 0xC2]);
-        assert_eq!(read.what, What::ToDrive([0x3D, 0x40, 0, 0, 0, 7, 8, 9], 3));
+        assert_eq!(
+            read.what,
+            DriveOperation::ToDrive([0x3D, 0x40, 0, 0, 0, 7, 8, 9], 3)
+        );
         assert_eq!(read.wait, 2);
         let input = operation([0xD3, 1, 0, 0, 0, 0, 0xFF]);
-        assert_eq!((input.what, input.wait), (What::Switch(3, true), 15));
+        assert_eq!(
+            (input.what, input.wait),
+            (DriveOperation::Switch(3, true), 15)
+        );
         let time = operation([0xFF, 0, 200, 0, 0, 0, 0]);
-        assert_eq!((time.what, time.wait), (What::Time(50), 0));
+        assert_eq!((time.what, time.wait), (DriveOperation::Time(50), 0));
         let foreign = operation([0xB5, 0, 1, 2, 0, 0x80, 0]);
-        assert!(matches!(foreign.what, What::Elsewhere(id, _, 5) if id.is_extended()));
+        assert!(matches!(foreign.what, DriveOperation::Elsewhere(id, _, 5) if id.is_extended()));
     }
 }

@@ -23,12 +23,12 @@ const MOST_FRAMES: usize = 500;
 /// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
-    what: What,
+    what: MasterOperation,
     wait: Span,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum What {
+enum MasterOperation {
     /// A job is given to the master.
     Give(Job),
     /// The next frame of a drive that hears the master arrives this number of times.
@@ -63,17 +63,19 @@ impl<'a> Arbitrary<'a> for Operation {
         let data = [register, a, b, c, d, 7, 8, 9];
         let tx = Id::base(DEFAULT_TX);
         let what = match (what >> 4, tx) {
-            (0..=3, _) => What::Give(job(low, register, [a, b, c, d])),
-            (4..=7, _) => What::Answer(1),
-            (8, _) => What::Answer(0),
-            (9, _) => What::Answer(2),
-            (0xA, Some(tx)) => What::Frame(tx, data, len),
+            (0..=3, _) => MasterOperation::Give(job(low, register, [a, b, c, d])),
+            (4..=7, _) => MasterOperation::Answer(1),
+            (8, _) => MasterOperation::Answer(0),
+            (9, _) => MasterOperation::Answer(2),
+            (0xA, Some(tx)) => MasterOperation::Frame(tx, data, len),
             (0xB, _) => Id::extended(u32::from_be_bytes([0, 0, a, b]))
-                .map_or(What::Time, |id| What::Frame(id, data, len)),
-            (0xC, _) => What::Asked(data, len),
-            (0xD, Some(tx)) => What::Remote(tx),
-            (0xE, _) => What::Enable(register & 1 == 0),
-            _ => What::Time,
+                .map_or(MasterOperation::Time, |id| {
+                    MasterOperation::Frame(id, data, len)
+                }),
+            (0xC, _) => MasterOperation::Asked(data, len),
+            (0xD, Some(tx)) => MasterOperation::Remote(tx),
+            (0xE, _) => MasterOperation::Enable(register & 1 == 0),
+            _ => MasterOperation::Time,
         };
         let wait = Span::from_millis(u64::from(wait & 0x3F));
         Ok(Self { what, wait })
@@ -177,39 +179,39 @@ impl Play {
         }
     }
 
-    fn happens(&mut self, what: What, notes: &mut Notebook<'_>) {
+    fn happens(&mut self, what: MasterOperation, notes: &mut Notebook<'_>) {
         match what {
-            What::Give(job) => self.give(job, notes),
-            What::Answer(times) => {
+            MasterOperation::Give(job) => self.give(job, notes),
+            MasterOperation::Answer(times) => {
                 self.drive.advance(self.now);
                 if let Some(waiting) = self.drive.sent() {
                     (0..times).for_each(|_| self.arrives(&waiting.frame, notes));
                 }
             }
-            What::Frame(id, data, len) => {
+            MasterOperation::Frame(id, data, len) => {
                 if let Ok(frame) = Frame::new(id, &data[..len]) {
                     self.arrives(&frame, notes);
                 }
             }
-            What::Asked(mut data, len) => {
+            MasterOperation::Asked(mut data, len) => {
                 data[0] = self.asked;
                 if let Ok(frame) = Frame::base(DEFAULT_TX, &data[..len]) {
                     self.arrives(&frame, notes);
                 }
             }
-            What::Remote(id) => {
+            MasterOperation::Remote(id) => {
                 if let Ok(frame) = Frame::remote(id, 4) {
                     self.arrives(&frame, notes);
                 }
             }
-            What::Enable(run) => {
+            MasterOperation::Enable(run) => {
                 let inputs = Inputs {
                     run,
                     ..*self.drive.inputs()
                 };
                 self.drive.set_inputs(self.now, inputs);
             }
-            What::Time => {}
+            MasterOperation::Time => {}
         }
         self.settle(notes);
     }

@@ -28,12 +28,12 @@ const HOSTS: usize = 2;
 /// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
-    what: What,
+    what: SegmentAct,
     wait: Span,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum What {
+enum SegmentAct {
     /// A host sends a frame to the drive with this number.
     Send(usize, usize, [u8; 8], usize),
     /// A host sends a frame that no drive takes.
@@ -68,27 +68,29 @@ impl<'a> Arbitrary<'a> for Operation {
             _ => Span::from_micros(100) * u64::from(wait & 0x7F),
         };
         let what = match high {
-            0..=9 => What::Send(high % HOSTS, high / HOSTS % DRIVES, data, len),
+            0..=9 => SegmentAct::Send(high % HOSTS, high / HOSTS % DRIVES, data, len),
             0xA => {
                 let number = u16::from_be_bytes([3, a]);
                 let base = Id::base(number);
                 let id = Id::extended(u32::from(number) << 18)
                     .filter(|_| b & 1 == 1)
                     .or(base);
-                id.map_or(What::Time, |id| What::Elsewhere(low % HOSTS, id, data, len))
+                id.map_or(SegmentAct::Time, |id| {
+                    SegmentAct::Elsewhere(low % HOSTS, id, data, len)
+                })
             }
-            0xB => What::Fault(Placed {
+            0xB => SegmentAct::Fault(Placed {
                 station: Some(usize::from(register)).filter(|place| *place < HOSTS + DRIVES),
                 frame: 1 + u64::from(a % 32),
                 fault: fault(low, b),
             }),
-            0xC => What::Switch(
+            0xC => SegmentAct::Switch(
                 low % DRIVES,
                 usize::from(register) % Inputs::SWITCHES.len(),
                 a & 1 != 0,
             ),
-            0xD => What::Restart(low % HOSTS),
-            _ => What::Time,
+            0xD => SegmentAct::Restart(low % HOSTS),
+            _ => SegmentAct::Time,
         };
         Ok(Self { what, wait })
     }
@@ -174,25 +176,25 @@ impl Case {
         }
     }
 
-    fn happens(&mut self, what: What) {
+    fn happens(&mut self, what: SegmentAct) {
         match what {
-            What::Send(host, drive, data, len) => {
+            SegmentAct::Send(host, drive, data, len) => {
                 let own_identifier = len > 2 && data[0] == 0x69;
                 let frame = Frame::base(identifiers(drive).0, &data[..len]);
                 if let (false, Ok(frame)) = (own_identifier, frame) {
                     self.send(host, frame);
                 }
             }
-            What::Elsewhere(host, id, data, len) => {
+            SegmentAct::Elsewhere(host, id, data, len) => {
                 if let Ok(frame) = Frame::new(id, &data[..len]) {
                     self.send(host, frame);
                 }
             }
-            What::Fault(placed) => {
+            SegmentAct::Fault(placed) => {
                 self.faults.push(placed);
                 self.segment.inject(placed);
             }
-            What::Switch(number, input, on) => {
+            SegmentAct::Switch(number, input, on) => {
                 let (now, behind) = (self.now, self.segment.record().len());
                 let Some(drive) = self.segment.station_mut(HOSTS + number).drive_mut() else {
                     return;
@@ -209,8 +211,8 @@ impl Case {
                     inputs,
                 });
             }
-            What::Restart(host) => self.segment.restart(host),
-            What::Time => {}
+            SegmentAct::Restart(host) => self.segment.restart(host),
+            SegmentAct::Time => {}
         }
     }
 
@@ -417,7 +419,7 @@ mod tests {
     fn case() -> Case {
         let mut case = Case::new(BitRate::K500);
         for data in [[0x3D, 0x40, 0, 0, 0, 0, 0, 0], [0x31, 1, 0, 0, 0, 0, 0, 0]] {
-            case.happens(What::Send(0, 0, data, 3));
+            case.happens(SegmentAct::Send(0, 0, data, 3));
             case.now += Span::from_millis(1);
             case.segment.run_until(case.now);
         }
