@@ -193,7 +193,7 @@ impl<D: CommandDrives> HeldBench for HeldPort<D> {
         let drives = self.0.session().drives().listed();
         drives
             .iter()
-            .map(|own| D::number(own).to_string())
+            .map(|drive| D::number(drive).to_string())
             .collect()
     }
 

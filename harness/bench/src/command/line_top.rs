@@ -158,7 +158,7 @@ impl<D: HeldDrives> TopReader for LineReader<'_, D> {
     }
 
     fn named(&self, drives: &[usize]) -> String {
-        let drives: Vec<_> = drives.iter().map(|own| self.drives[*own]).collect();
+        let drives: Vec<_> = drives.iter().map(|place| self.drives[*place]).collect();
         D::named(&drives)
     }
 
@@ -247,12 +247,12 @@ impl LineTraffic {
     /// Counts rows of the picture.
     fn take(&mut self, rows: &[LiveRow], now: Instant) {
         for row in rows {
-            let Some(own) = row.sender().filter(|own| *own < self.names.len()) else {
+            let Some(station) = row.sender().filter(|station| *station < self.names.len()) else {
                 continue;
             };
             let rows = row.fold.max(1);
-            self.counts[own] += rows;
-            self.damaged[own] += if row.is_damaged() { rows } else { 0 };
+            self.counts[station] += rows;
+            self.damaged[station] += if row.is_damaged() { rows } else { 0 };
         }
         let (before, span) = self.window.take(now, self.counts.clone());
         let seconds = span.as_millis_f64() / 1_000.0;
@@ -267,12 +267,12 @@ impl LineTraffic {
     /// A row a station.
     fn table(&self) -> Vec<Vec<String>> {
         let stations = self.names.iter().enumerate();
-        let row = |(own, name): (usize, &String)| {
+        let row = |(station, name): (usize, &String)| {
             vec![
                 name.clone(),
-                self.counts[own].to_string(),
-                format!("{:.1}", self.rates[own]),
-                self.damaged[own].to_string(),
+                self.counts[station].to_string(),
+                format!("{:.1}", self.rates[station]),
+                self.damaged[station].to_string(),
             ]
         };
         stations.map(row).collect()
@@ -280,7 +280,7 @@ impl LineTraffic {
 
     /// All stations in a line, with the heads of the table.
     fn line(&self, [_, counted, rate, damaged]: &[&str; 4]) -> HeadLine {
-        let [count, bad] = [&self.counts, &self.damaged].map(|own| own.iter().sum::<u64>());
+        let [count, bad] = [&self.counts, &self.damaged].map(|counts| counts.iter().sum::<u64>());
         let sum: f64 = self.rates.iter().sum();
         HeadLine {
             text: format!("  {sum:.1} {rate}, {count} {counted}, {bad} {damaged}"),

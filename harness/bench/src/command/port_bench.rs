@@ -106,12 +106,15 @@ pub fn select<D: HeldDrives>(
 ) -> Result<Vec<D::Drive>, Failure> {
     let [drive, line] = D::WORDS;
     let all = session.drives().listed();
-    let of = |number: u8| all.iter().find(|own| D::number(own) == number).copied();
+    let of = |number: u8| all.iter().find(|drive| D::number(drive) == number).copied();
     each_once(wanted, |axes| match axes {
         Axes::All => Ok(all.clone()),
         Axes::Some(0, numbers) => {
-            if let Some(missing) = numbers.clone().find(|own| of(*own).is_none()) {
-                let known: Vec<_> = all.iter().map(|own| D::number(own).to_string()).collect();
+            if let Some(missing) = numbers.clone().find(|number| of(*number).is_none()) {
+                let known: Vec<_> = all
+                    .iter()
+                    .map(|drive| D::number(drive).to_string())
+                    .collect();
                 return Err(format!(
                     "the rig has no {drive} {missing}: {} expected",
                     known.join(", ")
@@ -133,9 +136,9 @@ pub fn each_once<T: PartialEq>(
 ) -> Result<Vec<T>, Failure> {
     let mut selected = Vec::new();
     for axes in wanted {
-        for own in find(axes).map_err(Failure::refused)? {
-            if !selected.contains(&own) {
-                selected.push(own);
+        for found in find(axes).map_err(Failure::refused)? {
+            if !selected.contains(&found) {
+                selected.push(found);
             }
         }
     }

@@ -227,8 +227,8 @@ impl Readings<'_> {
             }
             let drawn = self.curves.iter_mut().zip(columns).take(MAX_CURVES);
             for (curve, column) in drawn {
-                let own = found.iter().find(|own| own.is_of(column));
-                let value = own.and_then(|own| number_of(&own.digits, own.unit));
+                let cell = found.iter().find(|cell| cell.is_of(column));
+                let value = cell.and_then(|cell| number_of(&cell.digits, cell.unit));
                 curve.points.push((at.as_millis_f64(), value));
             }
         }
@@ -265,8 +265,8 @@ fn heading(columns: &[WatchedCell]) -> String {
 fn row(at: Span, columns: &[WatchedCell], found: &[WatchedCell]) -> String {
     let mut line = format!("{:.3}", at.as_millis_f64());
     for column in columns {
-        let own = found.iter().find(|own| own.is_of(column));
-        line.push_str(&format!(",{}", own.map_or("", |own| &own.digits)));
+        let cell = found.iter().find(|cell| cell.is_of(column));
+        line.push_str(&format!(",{}", cell.map_or("", |cell| &cell.digits)));
     }
     line
 }

@@ -207,7 +207,7 @@ impl HeldBench for HeldRings {
         let found = self.apart(|session| super::recover::every(session.link(), rings))?;
         let texts = found.iter().enumerate();
         Ok(texts
-            .map(|(ring, own)| super::recover::text(ring, own))
+            .map(|(ring, recovered)| super::recover::text(ring, recovered))
             .collect())
     }
 

@@ -105,7 +105,7 @@ pub(crate) fn read(
     let no_table = |key: &str| format!("`{key}` is no table");
     let (mut written, mut problems) = entries(source, TABLE, no_table, |key, value| {
         let (span, name) = (place(key.span()), key.get_ref());
-        let Some(at) = names.iter().position(|own| own == name) else {
+        let Some(at) = names.iter().position(|known| known == name) else {
             let message = format!("`{name}` is not a parameter");
             let expected = "a name of FF60-FF7F or of a cell with a home in the EEPROM (ND21 14.2)";
             return Err(Problem::new(span, message, expected).did_you_mean(name, &names));
@@ -114,7 +114,10 @@ pub(crate) fn read(
         Ok((at, (known[at].clone(), value, span)))
     });
     written.sort_by_key(|(at, _)| *at);
-    let written: Vec<_> = written.into_iter().map(|(_, own)| own).collect();
+    let written: Vec<_> = written
+        .into_iter()
+        .map(|(_, parameter)| parameter)
+        .collect();
     let units = units(&written, drive);
     let mut read = Vec::new();
     for (location, value, span) in written {
@@ -135,11 +138,11 @@ pub(crate) fn read(
 
 /// With the range of speeds that the file itself sets (14.3.2).
 fn units(written: &[(MemoryRange, Written, TextSpan)], drive: DriveUnits) -> DriveUnits {
-    let own = written
+    let version = written
         .iter()
         .find(|(location, ..)| location.address() == ram::SW_VERSION2)
         .and_then(|(location, value, _)| location.bytes(value, drive).ok());
-    match own.as_deref() {
+    match version.as_deref() {
         Some([byte]) => DriveUnits {
             range: SpeedRange::from_sw_version2(*byte),
             ..drive

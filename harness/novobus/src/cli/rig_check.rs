@@ -175,7 +175,7 @@ fn object(rig: &Rig, figures: &Figures) -> serde_json::Value {
                 "most_ms": spread.map(|spread| spread[2]),
                 "lost": ring.lost,
                 "line_errors": ring.line_errors,
-                "wrong_parity": ring.wrong_parity.map(|own| own == WrongParity::Noticed),
+                "wrong_parity": ring.wrong_parity.map(|found| found == WrongParity::Noticed),
             })
         })
         .collect();

@@ -181,7 +181,7 @@ impl TopReader for Reader<'_> {
     }
 
     fn named(&self, drives: &[usize]) -> String {
-        let drives: Vec<_> = drives.iter().map(|own| self.axes[*own]).collect();
+        let drives: Vec<_> = drives.iter().map(|place| self.axes[*place]).collect();
         axes::named(&drives)
     }
 

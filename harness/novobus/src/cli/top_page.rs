@@ -23,7 +23,7 @@ impl HeardLinks {
             });
             let heard = all
                 .enumerate()
-                .filter(|(_, own)| link.listens(own.0, own.1));
+                .filter(|(_, link_of)| link.listens(link_of.0, link_of.1));
             Self {
                 columns: heard.map(|(column, _)| column).collect(),
                 recorder: Recorder::new(&sizes, link.medium(0).octet_time()),
@@ -35,7 +35,7 @@ impl HeardLinks {
     /// The picture without a row.
     pub(super) fn picture(&self) -> LivePicture {
         let links = links(&self.sizes);
-        let names = self.columns.iter().filter_map(|own| links.get(*own));
+        let names = self.columns.iter().filter_map(|column| links.get(*column));
         picture(names.cloned().collect())
     }
 
@@ -64,7 +64,7 @@ impl HeardLinks {
         });
         let mut rows = now.map_or_else(Rows::default, |now| self.recorder.rows(now));
         for cell in rows.rows.iter_mut().flat_map(|row| &mut row.cells) {
-            let column = self.columns.iter().position(|own| *own == cell.0);
+            let column = self.columns.iter().position(|place| *place == cell.0);
             cell.0 = column.unwrap_or(0);
         }
         rows

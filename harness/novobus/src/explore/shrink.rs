@@ -100,7 +100,10 @@ impl Shrinkable for Case {
             all.extend([alone, smallest]);
         }
         all.extend((1..subject.case.drives).map(|drives| on_ring(subject, drives)));
-        let cells = subject.case.orders().filter_map(|own| own.command.cell());
+        let cells = subject
+            .case
+            .orders()
+            .filter_map(|order| order.command.cell());
         let cells: BTreeSet<u16> = cells.filter(|cell| *cell > FIRST_CELL).collect();
         for cell in cells {
             let mut lower = subject.clone();

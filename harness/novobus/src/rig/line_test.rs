@@ -88,7 +88,11 @@ pub(crate) fn answers(
 /// what it sends itself.
 pub(crate) fn hears_itself(line: &mut dyn link::Line, ring: usize) -> bool {
     let heard = answers(line, ring, &COUNT, FIRST_BYTE);
-    heard.len() == COUNT.len() && heard.iter().zip(COUNT).all(|((_, byte), own)| byte.is(own))
+    heard.len() == COUNT.len()
+        && heard
+            .iter()
+            .zip(COUNT)
+            .all(|((_, byte), counted)| byte.is(counted))
 }
 
 /// A telegram to no drive with a net byte FF (ND21 9.3), which in-band marks double.

@@ -138,7 +138,9 @@ impl RecordJudge for RingJudge {
         let link = self.replay(&[]).keeping_parity(keeping_parity(&self.rig));
         // What the guard knew of the drives is not in the record.
         let limited = !self.limits.allow_everything();
-        let words = remarks.first().and_then(|own| own.strip_prefix(DENIED));
+        let words = remarks
+            .first()
+            .and_then(|remark| remark.strip_prefix(DENIED));
         let denied = words.filter(|_| limited);
         let denied = denied.map(|words| Why::Denied(words.to_owned()).into());
         let why = not_played(&entry.plan, &link, &self.way.rings).or(denied)?;
@@ -174,7 +176,7 @@ impl RecordJudge for RingJudge {
     }
 
     fn is_trial(&self, name: &str) -> bool {
-        TRIALS.iter().any(|own| name.starts_with(own))
+        TRIALS.iter().any(|trial| name.starts_with(trial))
     }
 
     fn begin_part(&mut self) {

@@ -9,7 +9,7 @@ use harness_proto::line::Rate;
 /// A UART has one parity setting for both directions. Two flipped bits keep the parity right.
 #[test]
 fn an_interposer_with_one_uart_takes_no_wrong_parity() {
-    let named = Capability::NAMES.iter().map(|(_, own)| *own).collect();
+    let named = Capability::NAMES.iter().map(|(_, name)| *name).collect();
     let link = Replay::new(Vec::new(), Rate::default(), Span::ZERO, vec![3], named);
     let link = link.reaching([(0, 0), (0, 1)]).keeping_parity([(0, 1)]);
     let rings = [RingSize::new(3).expect("a ring")];
