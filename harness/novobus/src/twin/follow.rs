@@ -245,14 +245,18 @@ impl Twin {
         let before = longer.then(|| self.clone());
         let mut comparison = self.compare(conversation, exactness, left_out);
         if let (Some(before), Some(found)) = (before, &comparison.divergence) {
-            let mut races = comparison.unasked.iter().rev();
-            let mut here = races.by_ref().filter(|race| race.ring == found.ring);
+            let races = comparison.unasked.iter();
+            let races = races.filter(|race| race.ring == found.ring);
             let ring = SeenRing {
                 ring: found.ring,
                 size: self.sizes[found.ring],
                 byte_time: self.link.byte_time(),
                 earliest: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
-                after_a_race: here.find_map(|race| race.until),
+                after_a_race: races.clone().rev().find_map(|race| race.until),
+                race: races
+                    .clone()
+                    .find(|race| race.until.is_none())
+                    .map(|race| race.at),
             };
             let heard = ring.held_back(conversation, found);
             let monitored = comparison.monitored;

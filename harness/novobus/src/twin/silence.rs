@@ -43,6 +43,8 @@ pub(super) struct SeenRing {
     pub(super) earliest: Span,
     /// Where drives have sent bytes unasked, and a check sequence has ended that: when the first byte came after it.
     pub(super) after_a_race: Option<Instant>,
+    /// Where nothing has ended that: when the first of them came.
+    pub(super) race: Option<Instant>,
 }
 
 impl SeenRing {
@@ -67,9 +69,10 @@ impl SeenRing {
             None => (0, 0),
         };
         // Where a byte comes back for each byte, all of them are answers.
-        let right = match received.len() == places.len() + unasked {
-            true => received.len(),
-            false => received.len().min(found.byte - 1),
+        let right = match (self.race, received.len() == places.len() + unasked) {
+            (Some(race), _) => received.partition_point(|(at, _)| *at < race),
+            (None, true) => received.len(),
+            (None, false) => received.len().min(found.byte - 1),
         };
         let answers = received[..right].iter().skip(first.max(unasked));
         let returned = places
