@@ -258,15 +258,16 @@ impl Twin {
                     .find(|race| race.until.is_none())
                     .map(|race| race.at),
             };
-            let heard = ring.held_back(conversation, found);
+            let (heard, more) = ring.held_back(conversation, found);
             let monitored = comparison.monitored;
             comparison.silenced = before.with_monitors(found.ring, monitored, |twin| {
-                heard.iter().any(|heard| {
+                let explained = heard.iter().any(|heard| {
                     let mut twin = twin.clone();
                     twin.rest(found.ring, heard.rest);
                     let comparison = twin.compare(&heard.conversation, exactness, left_out);
                     comparison.divergence.is_none() && ring.is_in_error(conversation, &comparison)
-                })
+                });
+                explained || more
             });
         }
         comparison

@@ -19,9 +19,9 @@ pub(crate) const SILENCED: &str = "the computer was late or the line was silent 
 /// Maximum time by which a byte is earlier over a socket that keeps a line's times than on a line.
 pub(super) const EARLY: Span = Span::from_millis(1);
 
-/// Maximum number of places in front of a difference at which bytes may have been held back. A drive that has missed its master shows it at
-/// once, unless its answers are zeros anyway.
-const MOST_PLACES: usize = 4;
+/// Maximum number of places at which bytes may have been held back. Where there are more and none of these explains a difference, it is not
+/// decided: a drive whose answers are zeros anyway shows late that it has missed its master.
+const MOST_PLACES: usize = 32;
 
 /// Silences that are tried, in milliseconds: one that a drive detects at once, and answers with zeros; one that every drive detects; one after
 /// which zeros come unasked (ND21 9.9).
@@ -54,8 +54,12 @@ impl SeenRing {
     }
 
     /// The conversation with the bytes of the ring held back, in each way that the bytes before a difference permit: none of them came back
-    /// before it had been round the ring.
-    pub(super) fn held_back(&self, conversation: &Conversation, found: &Divergence) -> Vec<Heard> {
+    /// before it had been round the ring. Whether there are more ways than these.
+    pub(super) fn held_back(
+        &self,
+        conversation: &Conversation,
+        found: &Divergence,
+    ) -> (Vec<Heard>, bool) {
         let sent = conversation.sent_in(self.ring);
         let received = conversation.received_in(self.ring);
         let way = self.way();
@@ -88,19 +92,21 @@ impl SeenRing {
         let ended = ended
             .map(|index| index + SEQUENCE.len())
             .max(self.after_a_race.map(|_| first));
+        // So have more bytes than an answer has that drives in the error mode do not send (9.7).
+        let answers = before.iter().enumerate().rev();
+        let mut answers = answers.filter(|(_, heard)| is_other(heard, self.size));
+        let answered = answers.nth(LONGEST_ANSWER).map(|(index, _)| index + 1);
+        let begins = ended.max(answered);
         let place = |index: usize| places.get(index.saturating_sub(unasked)).copied();
-        let from = ended.map_or(Some(0), place).unwrap_or(sent.len());
+        let from = begins.map_or(Some(0), place).unwrap_or(sent.len());
         let differs = place(found.byte - 1).map_or(sent.len(), |place| place + 1);
         let by_returns = self.moved(conversation, |place, start, free| {
             let index = returned.binary_search_by_key(&place, |(place, _)| *place);
             index.map_or(start, |index| returned[index].1).max(free)
         });
-        // Drives that were in the error mode from the beginning have sent nothing else than that (ND21 9.7).
-        let from_the_begin =
-            ended.is_none() && answers_in_race(before, self.size) <= LONGEST_ANSWER;
         let silences = SILENCES.map(Span::from_millis);
         let heard = |rest, conversation| Heard { rest, conversation };
-        let mut all = Vec::new();
+        let (mut all, mut more) = (Vec::new(), false);
         for base in [conversation, &by_returns] {
             let starts = base.sent_at(self.ring);
             // The latest time at which a byte can have left.
@@ -110,8 +116,9 @@ impl SeenRing {
                 after.min().unwrap_or(Instant::NEVER)
             };
             let long = |place: &usize| latest(*place) >= starts[place - 1] + self.earliest;
-            let places = (from.max(1)..differs.min(starts.len())).rev().filter(long);
-            for place in places.take(MOST_PLACES) {
+            let places = from.max(1)..differs.min(starts.len());
+            let mut places = places.rev().filter(long);
+            for place in places.by_ref().take(MOST_PLACES) {
                 let (before, latest) = (starts[place - 1], latest(place));
                 let ends = silences.iter().map(|silence| before + *silence);
                 let ends = ends.chain([latest]).filter(|end| *end < Instant::NEVER);
@@ -124,11 +131,12 @@ impl SeenRing {
                 });
                 all.extend(late.map(|late| heard(Span::ZERO, late)));
             }
-            let rests = silences.into_iter().filter(|_| from_the_begin);
+            more |= places.next().is_some();
+            let rests = silences.into_iter().filter(|_| begins.is_none());
             let rests = std::iter::once(Span::ZERO).chain(rests);
             all.extend(rests.map(|rest| heard(rest, base.clone())));
         }
-        all
+        (all, more)
     }
 
     /// Whether what came in the race of a comparison can have come from drives in the error mode: zeros and the numbers of drives (ND21 9.7), up to
@@ -182,18 +190,18 @@ impl SeenRing {
 /// How many of these bytes, up to a whole check sequence (ND21 9.8), drives in the error mode do not send: neither zeros, nor numbers of drives
 /// (9.7), nor parts of such a sequence.
 pub(super) fn answers_in_race(heard: &[(Instant, Received)], size: RingSize) -> usize {
-    let sequence = SEQUENCE.map(Received::good);
-    let is_sequence =
-        |bytes: &[(Instant, Received)]| bytes.iter().map(|(_, byte)| *byte).eq(sequence);
-    let end = heard.windows(sequence.len()).position(is_sequence);
-    let of_the_sequence = |byte: &Received| SEQUENCE.contains(&byte.byte) && byte.error.is_none();
-    let is_number = |byte: &Received| byte.error.is_none() && byte.byte <= size.drives();
-    let is_other = |byte: &Received| !is_number(byte) && !of_the_sequence(byte);
+    let end = heard.windows(SEQUENCE.len()).position(is_check_sequence);
     let of_the_race = &heard[..end.unwrap_or(heard.len())];
     of_the_race
         .iter()
-        .filter(|(_, byte)| is_other(byte))
+        .filter(|heard| is_other(heard, size))
         .count()
+}
+
+/// Whether drives in the error mode do not send a byte.
+fn is_other((_, heard): &(Instant, Received), size: RingSize) -> bool {
+    let is_number = heard.byte <= size.drives();
+    heard.error.is_some() || !is_number && !SEQUENCE.contains(&heard.byte)
 }
 
 fn is_check_sequence(bytes: &[(Instant, Received)]) -> bool {
