@@ -1,5 +1,6 @@
 //! Derives the verdict of each scenario again from its attempts, and checks the reasons of skipped scenarios.
 
+use super::attempt::RecordedVerdict;
 use super::files::{SCENARIOS, sum};
 use super::record::RecordLine;
 use super::verify::{JudgedAttempt, OpenedFolder};
@@ -180,27 +181,30 @@ impl Settling<'_> {
     }
 }
 
-/// The outcomes of attempts as they were judged again.
+/// The attempts as they were judged again.
 fn settled(attempts: &[JudgedAttempt<'_>]) -> Vec<Attempt> {
-    let outcomes = attempts.iter().filter_map(JudgedAttempt::outcome);
-    outcomes
-        .map(|outcome| Attempt::new(outcome, Vec::new()))
-        .collect()
+    let settled = attempts.iter().filter_map(JudgedAttempt::attempt);
+    settled.collect()
+}
+
+impl RecordedVerdict {
+    /// An attempt as it was judged again, with faults that never happened, which only the run knows. Which byte was late decides whether there is
+    /// another attempt.
+    fn settles(&self, again: &Attempt) -> Attempt {
+        let outcome = Outcome {
+            remarks: self.remarks.clone(),
+            // On a simulated rig the record lacks the time of bytes that were not fetched; playing it again shows it.
+            took: self.took,
+            ..again.outcome.clone()
+        };
+        Attempt {
+            outcome,
+            ..again.clone()
+        }
+    }
 }
 
 impl JudgedAttempt<'_> {
-    /// The outcome as it was judged again, with faults that never happened, which only the run knows.
-    fn outcome(&self) -> Option<Outcome> {
-        let (_, again) = self.again.as_ref().ok()?;
-        let stated = self.recorded.verdict.as_ref()?;
-        Some(Outcome {
-            remarks: stated.remarks.clone(),
-            // On a simulated rig the record lacks the time of bytes that were not fetched; playing it again shows it.
-            took: stated.took,
-            ..again.attempt.outcome.clone()
-        })
-    }
-
     /// Whether the rig's line was lost in it, or the like: nothing is played behind it.
     pub(super) fn ends_the_run(&self) -> bool {
         let mut events = self.recorded.events.iter();
@@ -210,10 +214,7 @@ impl JudgedAttempt<'_> {
     /// The attempt as it was judged again.
     pub(super) fn attempt(&self) -> Option<Attempt> {
         let (_, again) = self.again.as_ref().ok()?;
-        Some(Attempt {
-            outcome: self.outcome()?,
-            ..again.attempt.clone()
-        })
+        Some(self.recorded.verdict.as_ref()?.settles(&again.attempt))
     }
 }
 
@@ -257,4 +258,43 @@ pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
     let rings = entry.settled.rings()?;
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
     (rings.drives != sizes).then(|| Skip::other_size(rings.sizes, sizes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::LateByte;
+    use harness_proto::time::Span;
+
+    /// A run ends after two attempts in which other bytes were late, and so does its record.
+    #[test]
+    fn which_byte_was_late_decides_how_many_attempts_there_are() {
+        let tolerance = Span::from_millis(20);
+        let ends_after = |bytes: [&str; 2]| {
+            let attempts = bytes.map(|which| {
+                let outcome = Outcome {
+                    verdict: Verdict::Marginal,
+                    ..Outcome::rig_error("late".to_owned())
+                };
+                let by = 40_000_000;
+                let which = which.to_owned();
+                let again = Attempt {
+                    late: Some(LateByte { which, by }),
+                    ..Attempt::new(outcome, Vec::new())
+                };
+                let recorded = RecordedVerdict {
+                    verdict: Verdict::Marginal.name().to_owned(),
+                    finding: None,
+                    remarks: Vec::new(),
+                    took: Span::ZERO,
+                    unplaced: 0,
+                    opening: None,
+                };
+                recorded.settles(&again)
+            });
+            !RetryRule::new(tolerance).after(&attempts, 3)
+        };
+        assert!(ends_after(["byte 3", "byte 5"]));
+        assert!(!ends_after(["byte 3", "byte 3"]));
+    }
 }
