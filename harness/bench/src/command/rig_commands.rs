@@ -10,7 +10,7 @@ use super::held::{HeldBench, HeldPort};
 use super::output::Output;
 use super::port_bench::PortBench;
 use super::rig_failure::exit_of;
-use crate::explore::line::LineRig;
+use crate::explore::line::{LineRig, LineTalk};
 use crate::rig::playing::run::{PortJudge, PortRun};
 use crate::rig::playing::{RecordJudge, RigRun};
 use crate::rig::{Rig, SessionError, UseOptions};
@@ -62,7 +62,7 @@ impl RigCommands {
                 Ok(Box::new(held))
             },
             check: check::<D>,
-            fuzz: FuzzCommands::of_line::<B>(),
+            fuzz: FuzzCommands::of::<LineTalk<B>>(),
         }
     }
 }

@@ -62,57 +62,50 @@ pub struct ShrinkOutcome<C: FuzzCase> {
     pub complete: bool,
 }
 
-/// A shrunk finding.
-#[derive(Clone, Debug)]
-pub(crate) struct Smaller<C: FuzzCase> {
-    pub finding: Finding<C>,
-    /// Whether nothing more could be removed.
-    pub complete: bool,
-}
-
 /// Numbers of repetitions to try in place of `count`, the smallest first.
 pub fn fewer(count: u8) -> impl Iterator<Item = u8> {
     let tried = [1, count / 2, count - count / 4, count.saturating_sub(1)].into_iter();
     tried.filter(move |fewer| (1..count).contains(fewer))
 }
 
-/// Shrinks a finding in at most `most` runs on `target`.
+impl<C: FuzzCase> Finding<C> {
+    /// What is shrunk of it.
+    #[must_use]
+    pub fn subject(&self) -> Subject<C> {
+        Subject {
+            case: self.case.clone(),
+            setup: self.setup.clone(),
+        }
+    }
+
+    /// The finding after it was shrunk.
+    #[must_use]
+    pub fn shrunk(&self, small: ShrinkOutcome<C>) -> Self {
+        Self {
+            shrunk_in: Some(small.runs),
+            difference: small.difference,
+            setup: small.subject.setup,
+            case: small.subject.case,
+            attempts: Vec::new(),
+            ..self.clone()
+        }
+    }
+}
+
+/// How the drives of a target differ in a subject's conversation; `None` if they do not, or if it is not permitted.
 ///
 /// # Errors
 /// The target fails.
-pub(crate) fn smaller<C: Shrinkable>(
-    finding: &Finding<C>,
+pub(crate) fn asked<C: FuzzCase>(
+    subject: &Subject<C>,
     target: &mut dyn Target<C>,
-    most: u32,
-) -> Result<Smaller<C>, ExploreError> {
-    let subject = Subject {
-        case: finding.case.clone(),
-        setup: finding.setup.clone(),
-    };
-    let (mut runs, mut spent) = (0, false);
-    let mut ask = |subject: &Subject<C>| {
-        spent |= runs >= most || target.over().is_some();
-        if spent {
-            return Ok(None);
-        }
-        let rehearsal = target.rehearse(&subject.case)?;
-        if rehearsal.denied.is_some() {
-            return Ok(None);
-        }
-        runs += 1;
-        target.begin();
-        Ok(target.attempt(&subject.case, &rehearsal)?.difference)
-    };
-    let small = shrink(subject, finding.difference.clone(), u32::MAX, &mut ask)?;
-    Ok(Smaller {
-        complete: !spent,
-        finding: Finding {
-            shrunk_in: Some(runs),
-            difference: small.difference,
-            case: small.subject.case,
-            ..finding.clone()
-        },
-    })
+) -> Result<Option<C::Difference>, ExploreError> {
+    let rehearsal = target.rehearse(&subject.case)?;
+    if rehearsal.denied.is_some() {
+        return Ok(None);
+    }
+    target.begin();
+    Ok(target.attempt(&subject.case, &rehearsal)?.difference)
 }
 
 /// Tries a subject and returns how its drives differ from the expected behaviour, or `None` if they do not.

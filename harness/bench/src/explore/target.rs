@@ -81,4 +81,12 @@ pub trait Target<C: FuzzCase> {
     fn over(&mut self) -> Option<String> {
         None
     }
+
+    /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
+    fn end_between_cases(&mut self) {}
+
+    /// The number of cases that were not judged, since too many models would have had to be played.
+    fn undecided(&self) -> u64 {
+        0
+    }
 }

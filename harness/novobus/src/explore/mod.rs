@@ -37,9 +37,8 @@ pub(crate) use novelty::features;
 pub(crate) use on_record::AttemptRecord;
 pub(crate) use on_rig::OnRig;
 pub(crate) use on_sim::OnSim;
-pub(crate) use oracle::Difference;
 #[cfg(test)]
-pub(crate) use oracle::{against_reference, beside};
+pub(crate) use oracle::{Difference, against_reference, beside};
 pub(crate) use page::page;
 pub(crate) use play::{MasterView, play};
 pub(crate) use setup::RingSetup;

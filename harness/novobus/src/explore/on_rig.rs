@@ -97,11 +97,6 @@ impl<'r, 's> OnRig<'r, 's> {
         })
     }
 
-    /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
-    pub(crate) fn end_between_cases(&mut self) {
-        self.run.session().link().set_deadline(None);
-    }
-
     /// Makes the drives ready, so that earlier bytes have no effect any more.
     fn begin_anew(&mut self) -> Result<Span, ExploreError> {
         let anew = self.run.way().anew;
@@ -308,6 +303,10 @@ impl Target<Case> for OnRig<'_, '_> {
             None | Some(Trouble::Denied(_)) => None,
             Some(trouble) => Some(trouble.to_string()),
         }
+    }
+
+    fn end_between_cases(&mut self) {
+        self.run.session().link().set_deadline(None);
     }
 }
 

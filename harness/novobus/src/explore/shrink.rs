@@ -7,12 +7,8 @@ use harness_bench::explore::smaller::{self, Shrinkable, fewer};
 use harness_proto::novobus::memory::RAM;
 use std::collections::BTreeSet;
 
-pub(crate) use harness_bench::explore::smaller::shrink;
-
 /// What is shrunk: a conversation with a ring.
 pub(crate) type Subject = smaller::Subject<Case>;
-/// The result of shrinking.
-pub(crate) type Shrunk = smaller::ShrinkOutcome<Case>;
 
 /// The first cell of the RAM.
 const FIRST_CELL: u16 = *RAM.start();

@@ -1,5 +1,6 @@
 //! What `fuzz`, `shrink` and `promote` do on every bus.
 
+pub mod case;
 pub mod line;
 pub mod power;
 pub mod promote;
@@ -17,14 +18,14 @@ use crate::explore::promote::Plays;
 use crate::explore::{ExploreError, FuzzCase, FuzzRun};
 use crate::rig::Rig;
 use crate::rig::buses::RigBuses;
+use case::ExploredCase;
 use power::PowerArguments;
 use promote::PromoteArguments;
 use replay::ReplayArguments;
 use run::FuzzRunArguments;
 use shrink::ShrinkArguments;
 use std::path::Path;
-
-pub use verify::verify_as;
+use verify::verify_as;
 
 /// What the commands do with the drives of a bus.
 pub struct FuzzCommands {
@@ -42,6 +43,21 @@ pub struct FuzzCommands {
     pub power: Option<PowerRun>,
     /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
     pub page: Option<Page>,
+}
+
+impl FuzzCommands {
+    /// The commands on the drives of a bus.
+    pub const fn of<C: ExploredCase>() -> Self {
+        Self {
+            run: run::run::<C>,
+            replay: replay::replay::<C>,
+            shrink: shrink::shrink::<C>,
+            promote: promote::keep::<C>,
+            verify: verify_as::<C>,
+            power: None,
+            page: None,
+        }
+    }
 }
 
 /// Makes the page of the run in a folder.

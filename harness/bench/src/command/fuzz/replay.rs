@@ -1,14 +1,17 @@
 //! Cases that a run has kept, played again.
 
+use super::case::{ExploredCase, settings};
 use super::watch::{FindingWriter, summary};
 use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
+use crate::command::rig_failure::use_options;
 use crate::counted::counted;
 use crate::explore::{
     Bounds, ExploreError, FuzzCase, FuzzRun, LogLine, Target, by_novelty, read_as,
 };
+use crate::rig::Rig;
 use clap::Args;
 use harness_proto::time::Span;
 use std::path::{Path, PathBuf};
@@ -35,11 +38,47 @@ pub struct ReplayArguments {
     pub wait: Option<Duration>,
 }
 
+/// Plays again what a run has kept.
+pub(super) fn replay<C: ExploredCase>(
+    rig: &Rig,
+    arguments: &ReplayArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let cases = match C::kept(&arguments.folder, rig) {
+        Ok(cases) => cases,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    if cases.is_empty() {
+        let folder = arguments.folder.display();
+        output.complain(&format!("{folder} holds no {}", C::missing(rig)));
+        return Ok(Exit::NothingSelected);
+    }
+    let begun = |ports, (scope, setup): (C::Scope, C::Setup)| {
+        let about = settings((&arguments.rig, ports), (&scope, setup), (0, (2, 3)));
+        FuzzRun::new(about, scope)
+    };
+    if !rig.is_simulated() {
+        let how = use_options("fuzz replay", arguments.allow_motion, arguments.wait);
+        return C::on_ports(rig, &how, output, &mut |target, scope, output| {
+            play(arguments, begun(true, scope), &cases, target, output)
+        });
+    }
+    let setup = C::setup(rig, None);
+    match C::simulated(&setup, Some(rig)) {
+        Ok(mut target) => {
+            let scope = C::scope(rig, &setup, true);
+            let run = begun(false, (scope, setup));
+            play(arguments, run, &cases, &mut *target, output)
+        }
+        Err(error) => Ok(tell(&error, output)),
+    }
+}
+
 /// Plays cases, the most telling first.
-pub fn play<C: FuzzCase>(
+fn play<C: FuzzCase>(
     arguments: &ReplayArguments,
     mut campaign: FuzzRun<C>,
-    cases: Vec<C>,
+    cases: &[C],
     target: &mut dyn Target<C>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -47,8 +86,10 @@ pub fn play<C: FuzzCase>(
     let mut allowed = Vec::new();
     let mut denied = 0;
     for case in cases {
-        match target.rehearse(&case) {
-            Ok(rehearsal) if rehearsal.denied.is_none() => allowed.push((case, rehearsal.features)),
+        match target.rehearse(case) {
+            Ok(rehearsal) if rehearsal.denied.is_none() => {
+                allowed.push((case.clone(), rehearsal.features))
+            }
             Ok(_) => denied += 1,
             Err(error) => return Ok(tell(&error, output)),
         }

@@ -1,18 +1,21 @@
 //! A fuzz run: its options, its bounds, and what is said of it.
 
+use super::case::{ExploredCase, settings};
 use super::watch::{FindingWriter, summary};
 use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::write;
+use crate::command::rig_failure::use_options;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal, unseal};
 use crate::explore::{
     Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, Planted, RunEnd, Target,
+    read_as,
 };
 use crate::partition::Partition;
-use crate::rig::state;
+use crate::rig::{Rig, state};
 use clap::Args;
 use harness_proto::time::Span;
 use std::path::PathBuf;
@@ -117,7 +120,7 @@ fn k_of_n(text: &str) -> Result<(u8, u8), String> {
 }
 
 /// The bounds of a run on a rig with ports.
-pub fn bounds_on_ports(arguments: &FuzzRunArguments) -> Bounds {
+fn bounds_on_ports(arguments: &FuzzRunArguments) -> Bounds {
     Bounds {
         cases: arguments.cases.unwrap_or(u64::MAX),
         wire: Some(span(arguments.wire_time.unwrap_or(WIRE))),
@@ -127,7 +130,7 @@ pub fn bounds_on_ports(arguments: &FuzzRunArguments) -> Bounds {
 }
 
 /// The bounds of a run on simulated drives.
-pub fn bounds_of_simulated(arguments: &FuzzRunArguments) -> Bounds {
+fn bounds_of_simulated(arguments: &FuzzRunArguments) -> Bounds {
     Bounds {
         cases: arguments.cases.unwrap_or(match arguments.wire_time {
             Some(_) => u64::MAX,
@@ -139,8 +142,65 @@ pub fn bounds_of_simulated(arguments: &FuzzRunArguments) -> Bounds {
     }
 }
 
+/// Explores the drives of a rig.
+pub(super) fn run<C: ExploredCase>(
+    rig: &Rig,
+    arguments: &FuzzRunArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let refused = match rig.is_simulated() || arguments.deviates.is_empty() {
+        true => C::refused(rig, arguments),
+        false => Some("--deviates is for simulated drives; this rig has ports".to_owned()),
+    };
+    if let Some(why) = refused {
+        output.complain(&why);
+        return Ok(Exit::Usage);
+    }
+    let before = match arguments.resume.as_deref().map(read_as::<C>).transpose() {
+        Ok(before) => before.map(|(kept, _)| kept.about),
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let name = before.as_ref().map_or(&arguments.rig, |about| &about.rig);
+    let ports = match &before {
+        Some(about) => about.ports,
+        None => arguments.behind_port || !rig.is_simulated(),
+    };
+    let drawn = (arguments.seed, arguments.confirm);
+    if ports {
+        let mut rig = rig.clone();
+        C::plant(&mut rig, &arguments.deviates);
+        let how = use_options("fuzz", arguments.allow_motion, arguments.wait);
+        return C::on_ports(&rig, &how, output, &mut |target, (scope, setup), output| {
+            target.end_between_cases();
+            output.say(&C::left_out(&rig, arguments.allow_motion));
+            let about = settings((name, true), (&scope, setup), drawn);
+            let bounds = bounds_on_ports(arguments);
+            explore(arguments, (about, scope), target, &bounds, output)
+        });
+    }
+    let setup = match &before {
+        Some(about) => about.setup.clone(),
+        None => C::setup(rig, Some(arguments)),
+    };
+    let mut target = match C::simulated(&setup, Some(rig)) {
+        Ok(target) => target,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let scope = C::scope(rig, &setup, false);
+    let about = settings((name, false), (&scope, setup), drawn);
+    let bounds = bounds_of_simulated(arguments);
+    let exit = explore(arguments, (about, scope), &mut *target, &bounds, output)?;
+    if target.undecided() > 0 {
+        output.say(&format!(
+            "{} not judged: more values of open points than are tried could explain what was seen\n",
+            counted(target.undecided(), "case")
+        ));
+    }
+    Ok(exit)
+}
+
 /// Begins a run or goes on with one, and tells what came of it.
-pub fn explore<C: FuzzCase>(
+fn explore<C: FuzzCase>(
     arguments: &FuzzRunArguments,
     (about, scope): (FuzzSettings<C>, C::Scope),
     target: &mut dyn Target<C>,

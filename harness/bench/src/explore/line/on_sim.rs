@@ -21,12 +21,6 @@ impl<B: LineBus> OnLine<B> {
             undecided: 0,
         }
     }
-
-    /// How many conversations were not judged, since too many models would have had to be played.
-    #[must_use]
-    pub(crate) const fn undecided(&self) -> u64 {
-        self.undecided
-    }
 }
 
 impl<B: LineBus> Target<LineTalk<B>> for OnLine<B> {
@@ -63,5 +57,9 @@ impl<B: LineBus> Target<LineTalk<B>> for OnLine<B> {
             before: None,
             not_played,
         })
+    }
+
+    fn undecided(&self) -> u64 {
+        self.undecided
     }
 }

@@ -84,11 +84,6 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
         })
     }
 
-    /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
-    pub(crate) fn end_between_cases(&mut self) {
-        self.session.link().set_deadline(None);
-    }
-
     /// Leaves the drives as they were before, as far as the rig's file permits that. Returns what could not be restored, in sentences.
     pub(crate) fn restore(&mut self) -> Vec<String> {
         self.session.link().reset_after_denial();
@@ -169,5 +164,9 @@ impl<B: LineRig> Target<LineTalk<B>> for OnAdapter<'_, B> {
             return Some("the run was interrupted".to_owned());
         }
         self.session.overdue().then(|| OVERDUE.to_owned())
+    }
+
+    fn end_between_cases(&mut self) {
+        self.session.link().set_deadline(None);
     }
 }

@@ -2,10 +2,10 @@
 //! scenarios.
 
 use super::{LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, SessionOf};
-use crate::explore::smaller::{Shrinkable as _, smaller};
+use crate::explore::smaller::{Shrinkable as _, Subject, asked, shrink};
 use crate::explore::{
     Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Planted, Pool, Progress,
-    RunEnd, Spiced, Swarm, Watcher,
+    RunEnd, Spiced, Swarm, Target as _, Watcher,
 };
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::language::Language;
@@ -151,9 +151,10 @@ impl<B: LineBus> EngineTrial<B> {
             };
             let under_test = finding.setup.under_test::<B>().expect("a header");
             let mut target = OnLine::<B>::new(under_test);
-            let small = smaller(finding, &mut target, 200)
-                .expect("a header")
-                .finding;
+            let mut ask = |subject: &Subject<_>| asked(subject, &mut target);
+            let difference = finding.difference.clone();
+            let small = shrink(finding.subject(), difference, 200, &mut ask).expect("a header");
+            let small = finding.shrunk(small);
             assert!(small.case.measure() <= finding.case.measure(), "{name}");
             let (shown, kind) = (&small.difference, &finding.difference);
             let is_like = shown.is_like(kind);

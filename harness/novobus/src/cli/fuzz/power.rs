@@ -1,9 +1,9 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
-use super::simulated;
 use crate::explore::masters;
-use crate::explore::{Case, Finding, FuzzRun, FuzzSettings, OnSim, Pool, RingSetup, Swarm};
+use crate::explore::{Case, Finding, FuzzRun, OnSim, Pool, RingSetup, Swarm};
 use harness_bench::command::exit::Exit;
+use harness_bench::command::fuzz::case::{ExploredCase as _, settings};
 use harness_bench::command::fuzz::power::PowerArguments;
 use harness_bench::command::fuzz::tell;
 use harness_bench::command::output::Output;
@@ -12,7 +12,6 @@ use harness_bench::explore::Planted;
 use harness_bench::explore::{Bounds, ExploreError, Progress, Watcher};
 use harness_bench::rig::buses::RigBuses;
 use harness_bench::rig::find;
-use harness_proto::novobus::guard::Limits;
 use harness_sim::novobus::deviation::{DEVIATIONS, Deviation, MASTER_DEVIATIONS};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -182,7 +181,8 @@ fn counts(
     arguments: &PowerArguments,
     buses: &'static RigBuses,
 ) -> Result<Vec<Option<u64>>, ExploreError> {
-    let rig = find(&format!("sim:{DRIVES}"), Path::new(""), buses)
+    let name = format!("sim:{DRIVES}");
+    let rig = find(&name, Path::new(""), buses)
         .map_err(|error| ExploreError::Usage(error.to_string()))?;
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {
@@ -196,19 +196,8 @@ fn counts(
             false => RingSetup::of_rig(&rig, &[planted], false),
         };
         let mut target = OnSim::new(setup.clone());
-        let scope = simulated(&rig, Limits::unlimited(), &setup);
-        let about = FuzzSettings {
-            schema: <FuzzSettings>::SCHEMA,
-            rig: format!("sim:{DRIVES}"),
-            drives: DRIVES,
-            second: None,
-            ports: false,
-            seed,
-            confirm: 1,
-            of: 1,
-            setup: setup.clone(),
-            spices: Vec::new(),
-        };
+        let scope = Case::scope(&rig, &setup, true);
+        let about = settings::<Case>((&name, false), (&scope, setup), (seed, (1, 1)));
         let mut campaign = FuzzRun::new(about, scope);
         let bounds = Bounds {
             cases: arguments.cases,

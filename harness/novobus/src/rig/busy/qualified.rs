@@ -2,7 +2,7 @@
 
 use super::line::Stalls;
 use super::{Run, rig, session};
-use crate::cli::fuzz::scope;
+use crate::cli::fuzz::port_scope;
 use crate::explore::{Case, Finding, FuzzRun, FuzzSettings, Pool, Swarm};
 use crate::explore::{OnRig, RingSetup};
 use crate::language::read::RingScenario;
@@ -131,7 +131,7 @@ fn found(drives: &str, (seed, one_in): (u64, u64), cases: u64) -> Vec<String> {
     let stalls = Stalls::new(seed, one_in);
     let mut session = session(&rig, drives, stalls).expect("a right ring that opens");
     let mut run = Run::new(&mut session).expect("a run");
-    let scope = scope(&mut run);
+    let scope = port_scope(&mut run);
     let about = FuzzSettings {
         schema: <FuzzSettings>::SCHEMA,
         rig: "busy".to_owned(),

@@ -1,12 +1,13 @@
 //! Findings made small, and kept.
 
 use super::{Difference, bounds, explore, planted};
-use crate::explore::shrink::{Shrunk, Subject, shrink};
+use crate::explore::shrink::Subject;
 use crate::explore::{Case, Finding, OnSim, RingSetup, against_reference, play};
 use crate::language::read::RingScenario;
 use crate::simulate::simulated;
 use harness_bench::explore::promote::{Naming, checkout, promote};
 use harness_bench::explore::smaller::Shrinkable as _;
+use harness_bench::explore::smaller::{ShrinkOutcome, shrink};
 use harness_bench::explore::{Differing as _, ExploreError, FuzzCase as _, Target};
 use harness_bench::link::Link as _;
 use harness_bench::scenario::run::run;
@@ -29,7 +30,7 @@ fn subject(finding: &Finding) -> Subject {
 }
 
 /// The first finding of a drive, and what it is made into.
-fn small(name: &str) -> (Finding, Shrunk) {
+fn small(name: &str) -> (Finding, ShrinkOutcome<Case>) {
     let (found, ..) = explore(&planted(1, name), 1, &bounds(10_000, 1));
     let finding = found
         .into_iter()
@@ -57,7 +58,7 @@ fn small(name: &str) -> (Finding, Shrunk) {
     (finding, shrunk)
 }
 
-fn page(finding: &Finding, shrunk: Shrunk) -> String {
+fn page(finding: &Finding, shrunk: ShrinkOutcome<Case>) -> String {
     let new = Finding {
         shrunk_in: Some(shrunk.runs),
         difference: shrunk.difference,
@@ -98,7 +99,7 @@ fn a_finding_is_made_readable() {
 /// ND21 10.2: a write that is never read back shows in the cell, which is compared with that of the reference model.
 #[test]
 fn a_cell_that_is_not_read_is_compared() {
-    let Shrunk { subject, .. } = small("writes-ignored").1;
+    let ShrinkOutcome { subject, .. } = small("writes-ignored").1;
     let mut case = subject.case;
     case.acts.truncate(1);
     let judged = |setup: &RingSetup| {

@@ -1,11 +1,12 @@
 //! Rigs of two rings: a case is with one of them, and the other one stays as it is (ND21 12.2).
 
 use super::{FindingList, about, bounds, scope_of};
-use crate::explore::shrink::{Subject, shrink};
+use crate::explore::shrink::Subject;
 use crate::explore::{
     Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
 };
 use crate::language::syntax::Header;
+use harness_bench::explore::smaller::shrink;
 use harness_bench::explore::{Differing as _, FuzzCase as _, Planted, Target, by_novelty};
 use harness_bench::link::Line as _;
 use harness_bench::link::Octets;
