@@ -6,6 +6,7 @@ pub mod counts;
 pub mod line;
 mod page;
 pub mod pairs;
+pub mod played;
 pub mod share;
 
 pub use page::page;

@@ -1,12 +1,10 @@
-//! The section of a campaign: where in the ring which class happens, as a map of letters and colours.
+//! The maps of a campaign: where in the ring which class happens, by letters and colours.
 
 use crate::campaign::PlayedCampaign;
 use crate::campaign::class::CaseClass;
 use crate::campaign::fault::{FaultEffect, LineBit};
-use crate::campaign::report::{WORST, happened};
-use harness_bench::campaign::share::{gravity, table};
 use harness_bench::html::Html;
-use harness_bench::report::html::{FoldedPart, Section};
+use harness_bench::link::link_name;
 use std::collections::BTreeMap;
 
 /// Maximum number of cells of a map; a larger map shows several bytes in one row.
@@ -18,46 +16,14 @@ const LINKS: usize = 251;
 /// How many cases there are of each class.
 type Counts = BTreeMap<CaseClass, u64>;
 
-fn name(finished: &PlayedCampaign) -> &str {
-    finished.name.trim_end_matches(".toml")
-}
-
-/// A campaign as a section; `number` counts the sections of the page from 1.
-pub(super) fn section(number: usize, finished: &PlayedCampaign) -> Section {
-    let mut html = Html::new();
-    html.line("p", &[], &finished.title);
-    html.line(
-        "p",
-        &[],
-        format_args!(
-            "{} cases of {}: {} drives, {} bytes.",
-            finished.outcomes.len(),
-            finished.scenario,
-            finished.drives,
-            finished.bytes
-        ),
-    );
-    table(&mut html, finished, false);
-    let instead = format!(
-        "It is in: drivebench campaign {} --format json",
-        name(finished)
-    );
-    let part = |heading: &str, html: Html| FoldedPart {
-        heading: heading.to_owned(),
-        html,
-        instead: instead.clone(),
-    };
-    let mut parts = vec![part("Where: links across, bytes down", by_byte(finished))];
-    parts.extend(by_bit(finished).map(|html| part("Which bit: links across, bits down", html)));
-    parts.push(part("By link", by_link(finished)));
-    parts.extend(worst(finished).map(|html| part("The worst", html)));
-    Section {
-        heading: name(finished).to_owned(),
-        id: format!("s{number}"),
-        gravity: gravity(finished),
-        html,
-        parts,
-    }
+/// The maps of a page, each with its heading.
+pub(super) fn maps(finished: &PlayedCampaign) -> Vec<(String, Html)> {
+    let by_byte = ("Where: links across, bytes down", by_byte(finished));
+    let by_bit = by_bit(finished).map(|html| ("Which bit: links across, bits down", html));
+    let all = std::iter::once(by_byte).chain(by_bit);
+    let all = all.chain([("By link", by_link(finished))]);
+    all.map(|(heading, html)| (heading.to_owned(), html))
+        .collect()
 }
 
 /// A map: a table with the most serious class in each cell. Colours only repeat the letters.
@@ -74,7 +40,7 @@ fn map(
             html.element("tr", &[], |html| {
                 html.line("th", &[("scope", &"col")], "");
                 for link in 0..links {
-                    let full = finished.link(link);
+                    let full = link_name(0, finished.drives, link);
                     let sender = full.split("->").next().unwrap_or_default();
                     let short = if link == 0 { "m" } else { sender };
                     html.line("th", &[("scope", &"col"), ("title", &full)], short);
@@ -118,7 +84,7 @@ fn add(to: &mut Counts, from: &Counts) {
 }
 
 fn by_byte(finished: &PlayedCampaign) -> Html {
-    let places = finished.by_place();
+    let places = by_place(finished);
     let last = places.keys().map(|(_, byte)| *byte).max().unwrap_or(0);
     let links = u64::from(finished.drives) + 1;
     let together = (last * links).div_ceil(CELLS as u64).max(1);
@@ -187,7 +153,7 @@ fn by_bit(finished: &PlayedCampaign) -> Option<Html> {
 
 fn by_link(finished: &PlayedCampaign) -> Html {
     let mut links: BTreeMap<usize, Counts> = BTreeMap::new();
-    for ((link, _), counts) in finished.by_place() {
+    for ((link, _), counts) in by_place(finished) {
         add(links.entry(link).or_default(), &counts);
     }
     let mut html = Html::new();
@@ -204,7 +170,11 @@ fn by_link(finished: &PlayedCampaign) -> Html {
             html.heads(&names);
             for (link, counts) in links.iter().take(LINKS) {
                 html.element("tr", &[], |html| {
-                    html.line("th", &[("scope", &"row")], finished.link(*link));
+                    html.line(
+                        "th",
+                        &[("scope", &"row")],
+                        link_name(0, finished.drives, *link),
+                    );
                     for class in CaseClass::ALL {
                         html.line(
                             "td",
@@ -219,34 +189,22 @@ fn by_link(finished: &PlayedCampaign) -> Html {
     html
 }
 
-fn worst(finished: &PlayedCampaign) -> Option<Html> {
-    let mut worst: Vec<_> = finished
-        .outcomes
-        .iter()
-        .filter(|outcome| outcome.class >= CaseClass::Recovered)
-        .collect();
-    worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
-    if worst.is_empty() {
-        return None;
-    }
-    let mut html = Html::new();
-    html.element("table", &[], |html| {
-        html.line(
-            "caption",
-            &[],
-            "The gravest cases, each with what plays it again",
-        );
-        html.heads(&["Class", "Case", "What happened", "Reproduce with"]);
-        for outcome in worst.into_iter().take(WORST) {
-            let case = outcome.case.name(finished.drives);
-            html.element("tr", &[], |html| {
-                html.line("td", &[], outcome.class.name());
-                html.line("th", &[("scope", &"row")], &case);
-                html.line("td", &[], happened(&outcome.evidence, finished.drives));
-                let again = format!("drivebench campaign {} --case '{case}'", name(finished));
-                html.line("td", &[("class", &"n")], again);
-            });
+/// How many cases of each class there are at each link and byte, where a case with two faults counts at both:
+/// the figures of a map with a row for a link and a column for a byte.
+#[must_use]
+pub(crate) fn by_place(
+    finished: &PlayedCampaign,
+) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
+    let mut map: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
+    for outcome in &finished.outcomes {
+        let mut places: Vec<_> = outcome.case.faults().map(|f| (f.link, f.byte)).collect();
+        places.dedup();
+        for place in places {
+            *map.entry(place)
+                .or_default()
+                .entry(outcome.class)
+                .or_default() += 1;
         }
-    });
-    Some(html)
+    }
+    map
 }

@@ -12,7 +12,7 @@ pub(crate) mod conversation;
 pub(crate) mod fault;
 pub(crate) mod file;
 pub(crate) mod find;
-mod html;
+pub(crate) mod html;
 pub(crate) mod pairs;
 pub(crate) mod plan;
 pub(crate) mod replay;

@@ -1,17 +1,14 @@
 //! The results of a campaign, for people and for tools.
 
 use super::class::{CaseClass, CaseEvidence, WrongValue};
-use crate::campaign::run::{CaseOutcome, PlayedCampaign};
-use harness_bench::campaign::PlayedCampaign as _;
-use harness_bench::campaign::share::counts;
+use super::html::maps;
+use super::run::{CaseOutcome, PlayedCampaign};
+use harness_bench::campaign::played::PlayedCase;
+use harness_bench::html::Html;
 use harness_bench::link::link_name;
 use harness_proto::nd21::cells::cell_at;
 use serde::Serialize;
 use std::fmt;
-use std::fmt::Write as _;
-
-/// How many of the worst cases a table shows.
-pub(crate) const WORST: usize = 10;
 
 /// How many wrong values a line shows.
 const VALUES: usize = 4;
@@ -74,73 +71,45 @@ pub(crate) fn happened(evidence: &CaseEvidence, drives: u8) -> String {
     parts.join("; ")
 }
 
-#[must_use]
-pub(crate) fn line(outcome: &CaseOutcome, drives: u8) -> String {
-    let name = outcome.case.name(drives);
-    let happened = happened(&outcome.evidence, drives);
-    let line = format!("{:18} {name:28} {happened}", outcome.class.name());
-    line.trim_end().to_owned() + "\n"
-}
+impl PlayedCase for CaseOutcome {
+    const SERIOUS: u8 = CaseClass::Recovered.outcome().gravity;
+    const LETTERS: bool = false;
 
-/// How many cases there are of each class, what differs from the file, and the worst cases.
-#[must_use]
-pub(crate) fn table(finished: &PlayedCampaign) -> String {
-    let all = finished.outcomes.len() as u64;
-    let mut text = format!(
-        "{}\n{}: {all} cases; {} drives, {} bytes of {}\n\n",
-        finished.title,
-        finished.name.trim_end_matches(".toml"),
-        finished.drives,
-        finished.bytes,
-        finished.scenario
-    );
-    text += &counts(finished);
-    let mut worst: Vec<_> = finished
-        .outcomes
-        .iter()
-        .filter(|outcome| outcome.class >= CaseClass::Recovered)
-        .collect();
-    worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
-    if !worst.is_empty() {
-        text.push_str("\n  the worst\n");
+    fn class(&self) -> usize {
+        self.class as usize
     }
-    for outcome in worst.into_iter().take(WORST) {
-        // Writing to a String cannot fail.
-        let _infallible = write!(text, "  {}", line(outcome, finished.drives));
+
+    fn name(&self) -> String {
+        self.case.name(self.drives)
     }
-    text
-}
 
-/// A campaign for tools.
-#[derive(Serialize)]
-struct Json<'a> {
-    name: &'a str,
-    title: &'a str,
-    scenario: &'a str,
-    drives: u8,
-    bytes: u64,
-    classes: Vec<JsonClass>,
-    differs: Vec<JsonDiffers>,
-    cases: Vec<JsonCase>,
-}
+    fn disturbed(&self) -> Option<&str> {
+        None
+    }
 
-#[derive(Serialize)]
-struct JsonClass {
-    class: CaseClass,
-    cases: u64,
-}
+    fn happened(&self) -> String {
+        happened(&self.evidence, self.drives)
+    }
 
-#[derive(Serialize)]
-struct JsonDiffers {
-    class: Option<&'static str>,
-    expected: u64,
-    found: u64,
+    fn json(&self) -> serde_json::Value {
+        let evidence = &self.evidence;
+        serde_json::json!(JsonCase {
+            noticed: evidence.noticed,
+            named: evidence.named.map(|link| link_name(0, self.drives, link)),
+            diagnosis: evidence.diagnosis.map(|fault| fault.to_string()),
+            sequences: evidence.sequences,
+            confirmed: evidence.confirmed,
+            wrong: evidence.wrong.iter().map(JsonWrong::from).collect(),
+        })
+    }
+
+    fn maps(played: &PlayedCampaign) -> Vec<(String, Html)> {
+        maps(played)
+    }
 }
 
 #[derive(Serialize)]
 struct JsonCase {
-    case: String,
-    class: CaseClass,
     noticed: bool,
     named: Option<String>,
     diagnosis: Option<String>,
@@ -186,50 +155,4 @@ impl From<&WrongValue> for JsonWrong {
             },
         }
     }
-}
-
-impl<'a> Json<'a> {
-    fn of(finished: &'a PlayedCampaign, only: Option<CaseClass>) -> Self {
-        let drives = finished.drives;
-        let wanted = |outcome: &&CaseOutcome| only.is_none_or(|class| outcome.class == class);
-        let case = |outcome: &CaseOutcome| {
-            let evidence = &outcome.evidence;
-            JsonCase {
-                case: outcome.case.name(drives),
-                class: outcome.class,
-                noticed: evidence.noticed,
-                named: evidence.named.map(|link| link_name(0, drives, link)),
-                diagnosis: evidence.diagnosis.map(|fault| fault.to_string()),
-                sequences: evidence.sequences,
-                confirmed: evidence.confirmed,
-                wrong: evidence.wrong.iter().map(JsonWrong::from).collect(),
-            }
-        };
-        let count = |class| JsonClass {
-            class,
-            cases: finished.count(class),
-        };
-        let differs = finished.differs().into_iter();
-        let differs = differs.map(|(class, expected, found)| JsonDiffers {
-            class: (class != "cases").then_some(class),
-            expected,
-            found,
-        });
-        Self {
-            name: finished.name.trim_end_matches(".toml"),
-            title: &finished.title,
-            scenario: &finished.scenario,
-            drives,
-            bytes: finished.bytes,
-            classes: CaseClass::ALL.map(count).into(),
-            differs: differs.collect(),
-            cases: finished.outcomes.iter().filter(wanted).map(case).collect(),
-        }
-    }
-}
-
-/// A campaign for tools, as `corpora/campaigns/README.md` describes; of its cases those of one class, where `only` is given.
-#[must_use]
-pub(crate) fn json(finished: &PlayedCampaign, only: Option<CaseClass>) -> serde_json::Value {
-    serde_json::json!(Json::of(finished, only))
 }

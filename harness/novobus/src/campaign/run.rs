@@ -5,26 +5,21 @@ use super::file::{CampaignFile, read};
 use super::plan::{Shape, cases};
 use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, MasterBytes};
-use crate::campaign::class::{CaseClass, CaseEvidence};
+use crate::campaign::class::{CaseClass, CaseEvidence, OUTCOMES};
 use crate::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::campaign::sharing::Sharing;
 use crate::language::read::RingScenario;
 use crate::language::syntax::{Setup, SetupKind};
 use crate::simulate::bench;
 use harness_bench::bus_name::BusName;
+use harness_bench::campaign::played::{Played, each_on_threads};
 use harness_bench::scenario::files::{LibraryError, sources};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::problem::{Problem, Problems};
 use harness_bench::scenario::source::Source;
-use std::collections::BTreeMap;
+use serde_json::Map;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::PoisonError;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
-/// How many cases a thread takes at once.
-const BATCH: usize = 32;
 
 /// A campaign that can be played.
 #[derive(Debug)]
@@ -54,6 +49,8 @@ enum ReadyConversation {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct CaseOutcome {
     pub case: CaseFaults,
+    /// How many drives the ring has: links are named by them.
+    pub drives: u8,
     /// The class of the outcome.
     pub class: CaseClass,
     /// The evidence for this class.
@@ -70,23 +67,7 @@ pub(crate) struct Contradiction {
 }
 
 /// A campaign that has been played.
-#[derive(Clone, Debug)]
-pub(crate) struct PlayedCampaign {
-    /// The campaign's name.
-    pub name: String,
-    /// What it shows.
-    pub title: String,
-    /// The name of its scenario.
-    pub scenario: String,
-    /// How many drives the ring has.
-    pub drives: u8,
-    /// How many bytes the conversation has.
-    pub bytes: u64,
-    /// Every case, in the order of the plan.
-    pub outcomes: Vec<CaseOutcome>,
-    /// The figures that the file pins.
-    pub expect: Vec<(&'static str, u64)>,
-}
+pub(crate) type PlayedCampaign = Played<CaseOutcome>;
 
 impl Campaign {
     /// Reads a campaign and its scenario; `folder` is where a scenario's path is looked for first.
@@ -255,6 +236,7 @@ impl Campaign {
         })?;
         Ok(CaseOutcome {
             case: *case,
+            drives: self.shape.drives,
             class,
             evidence,
         })
@@ -287,43 +269,21 @@ impl Campaign {
         threads: usize,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<PlayedCampaign, Contradiction> {
-        let next = AtomicUsize::new(0);
-        let failed = AtomicBool::new(false);
-        let done = Mutex::new(Vec::with_capacity(self.cases.len() / BATCH + 1));
-        let work = || {
+        let player = || {
             let mut player = self.player();
-            while !failed.load(Ordering::Relaxed) {
-                let first = next.fetch_add(BATCH, Ordering::Relaxed);
-                let Some(rest) = self.cases.get(first..).filter(|rest| !rest.is_empty()) else {
-                    return;
-                };
-                let batch = &rest[..BATCH.min(rest.len())];
-                let outcomes: Vec<_> = batch.iter().map(|case| player.play(case)).collect();
-                if outcomes.iter().any(Result::is_err) {
-                    failed.store(true, Ordering::Relaxed);
-                }
-                progress(outcomes.len() as u64);
-                let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-                done.push((first, outcomes));
-            }
+            move |case: &CaseFaults| player.play(case)
         };
-        std::thread::scope(|scope| {
-            for _ in 1..threads.max(1) {
-                scope.spawn(work);
-            }
-            work();
-        });
-        let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        done.sort_by_key(|(first, _)| *first);
-        let outcomes = done.into_iter().flat_map(|(_, outcomes)| outcomes);
         Ok(PlayedCampaign {
-            name: self.name.clone(),
+            name: self.name.trim_end_matches(".toml").to_owned(),
             title: self.file.title.clone(),
-            scenario: self.entry.short_name().to_owned(),
+            scenario: Some(self.entry.short_name().to_owned()),
             drives: self.shape.drives,
-            bytes: self.shape.length(),
-            outcomes: outcomes.collect::<Result<_, _>>()?,
+            count: self.shape.length(),
+            units: "bytes",
+            classes: &OUTCOMES,
             expect: self.file.expect.pinned(),
+            facts: Map::new(),
+            outcomes: each_on_threads(&self.cases, threads, progress, player)?,
         })
     }
 }
@@ -352,38 +312,5 @@ impl CasePlayer<'_> {
             Some(evidence) => self.campaign.outcome(case, evidence.as_ref().clone()),
             None => self.campaign.play(case).map(|(outcome, _)| outcome),
         }
-    }
-}
-
-impl PlayedCampaign {
-    /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
-    #[must_use]
-    pub(crate) fn link(&self, place: usize) -> String {
-        harness_bench::link::link_name(0, self.drives, place)
-    }
-
-    /// How many cases there are of a class.
-    #[must_use]
-    pub(crate) fn count(&self, class: CaseClass) -> u64 {
-        let of_class = |outcome: &&CaseOutcome| outcome.class == class;
-        self.outcomes.iter().filter(of_class).count() as u64
-    }
-
-    /// How many cases of each class there are at each link and byte, where a case with two faults counts at both:
-    /// the figures of a map with a row for a link and a column for a byte.
-    #[must_use]
-    pub(crate) fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
-        let mut map: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
-        for outcome in &self.outcomes {
-            let mut places: Vec<_> = outcome.case.faults().map(|f| (f.link, f.byte)).collect();
-            places.dedup();
-            for place in places {
-                *map.entry(place)
-                    .or_default()
-                    .entry(outcome.class)
-                    .or_default() += 1;
-            }
-        }
-        map
     }
 }

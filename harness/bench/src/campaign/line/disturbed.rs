@@ -1,7 +1,8 @@
 //! Plays a campaign on a shared line: reads its file, plans its cases and classifies their outcomes.
 
-use super::{LineCase, LineOutcome, PlayedLine};
+use super::{LineCase, LineOutcome};
 use crate::bus_name::BusName;
+use crate::campaign::played::{Played, each_on_threads};
 use crate::campaign::{Campaign, CampaignError, CaseFailure, OutcomeClass, PlayedCampaign, names};
 use crate::file::values::Time;
 use harness_proto::time::{Instant, Span};
@@ -16,6 +17,7 @@ const LONGEST: Span = Span::from_millis(10_000);
 const UNNOTICED: usize = 3;
 
 /// What the campaigns of a bus have in common.
+#[derive(Debug)]
 pub struct LineTable {
     pub bus: BusName,
     /// The campaigns that the binary carries.
@@ -33,17 +35,17 @@ pub struct LineTable {
 }
 
 /// The conversation of a campaign file, which the bus plays with a fault or without.
-pub trait DisturbedLine: Debug + Sized + 'static {
+pub trait DisturbedLine: Debug + Sized + Sync + 'static {
     /// A fault and its place on the line.
-    type Fault: Copy + Debug;
+    type Fault: Copy + Debug + Sync;
     /// The result of a step. Tables show its text.
-    type End: Debug + Display + PartialEq;
+    type End: Debug + Display + PartialEq + Sync;
     /// What the drive holds.
-    type State: Debug + PartialEq;
+    type State: Debug + PartialEq + Sync;
     /// What the master sends and receives.
-    type Piece: Debug;
+    type Piece: Debug + Sync;
     /// What the line carries.
-    type Carried: Debug;
+    type Carried: Debug + Sync;
 
     const TABLE: &'static LineTable;
 
@@ -268,30 +270,39 @@ impl<L: DisturbedLine> LineCampaign<L> {
         Ok((class, played))
     }
 
-    /// Plays every case, in order; `progress` is called after each.
+    /// Plays every case; see [`each_on_threads`].
     ///
     /// # Errors
     /// A case cannot be played: a defect of the bench.
-    pub(super) fn played(&self, progress: &dyn Fn(u64)) -> Result<PlayedLine, String> {
+    pub(super) fn played(
+        &self,
+        threads: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Played<LineOutcome>, String> {
         let outcome = |case: &(LineCase, L::Fault)| {
             let (class, played) = self.play(case)?;
-            progress(1);
-            Ok(LineOutcome {
+            Ok::<_, String>(LineOutcome {
                 case: case.0.clone(),
+                table: L::TABLE,
                 class,
                 happened: L::happened(&self.sound, &played),
                 steps: played.words(),
                 troubles: played.troubles,
             })
         };
-        let outcomes: Result<_, String> = self.cases.iter().map(outcome).collect();
-        Ok(PlayedLine {
+        Ok(Played {
             name: self.name.trim_end_matches(".toml").to_owned(),
             title: self.file.title.clone(),
-            table: L::TABLE,
-            count: self.sound.carried.len(),
+            scenario: None,
+            drives: 1,
+            count: self.sound.carried.len() as u64,
+            units: L::TABLE.units,
+            classes: &L::TABLE.classes,
             expect: self.file.expect.clone(),
-            outcomes: outcomes?,
+            facts: [("bus".to_owned(), L::TABLE.bus.name().into())]
+                .into_iter()
+                .collect(),
+            outcomes: each_on_threads(&self.cases, threads, progress, || outcome)?,
         })
     }
 
@@ -377,9 +388,9 @@ impl<L: DisturbedLine> Campaign for LineCampaign<L> {
 
     fn run(
         &self,
-        _: usize,
+        threads: usize,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Box<dyn PlayedCampaign>, String> {
-        Ok(Box::new(self.played(progress)?))
+        Ok(Box::new(self.played(threads, progress)?))
     }
 }

@@ -4,8 +4,6 @@
 //! is data in no bus's words, and this module shows it.
 
 mod disturbed;
-mod html;
-mod report;
 #[cfg(any(test, feature = "trials"))]
 pub mod trials;
 
@@ -14,11 +12,9 @@ pub use disturbed::{
     line_names,
 };
 
-use super::{OutcomeClass, PlayedCampaign};
-use crate::report::html::Section;
-
-/// The lowest gravity of the worst cases.
-const SERIOUS: u8 = 4;
+use super::played::{Played, PlayedCase};
+use crate::html::Html;
+use serde_json::{Value, json};
 
 /// A fault at a frame or telegram, in words.
 #[derive(Clone, Debug)]
@@ -41,11 +37,10 @@ impl LineCase {
 
 /// A case that was played.
 #[derive(Clone, Debug)]
-struct LineOutcome {
+pub struct LineOutcome {
     case: LineCase,
-    /// The class, as a place in the list of the campaign's classes.
+    table: &'static LineTable,
     class: usize,
-    /// What happened, in a line.
     happened: String,
     /// How each step ended.
     steps: Vec<String>,
@@ -53,75 +48,70 @@ struct LineOutcome {
     troubles: Vec<String>,
 }
 
-/// A campaign that was played.
-struct PlayedLine {
-    name: String,
-    /// What it shows, in a line.
-    title: String,
-    table: &'static LineTable,
-    /// How many frames or telegrams the conversation has without a fault.
-    count: usize,
-    /// The figures that its file pins: of a class, or of all `cases`.
-    expect: Vec<(&'static str, u64)>,
-    /// Every case, in order.
-    outcomes: Vec<LineOutcome>,
-}
+impl PlayedCase for LineOutcome {
+    const SERIOUS: u8 = 4;
+    const LETTERS: bool = true;
 
-impl PlayedLine {
-    fn of(&self, outcome: &LineOutcome) -> &'static OutcomeClass {
-        &self.table.classes[outcome.class]
+    fn class(&self) -> usize {
+        self.class
     }
 
-    /// The serious cases, the worst class first.
-    fn serious(&self) -> Vec<&LineOutcome> {
-        let serious = |outcome: &&LineOutcome| self.of(outcome).gravity >= SERIOUS;
-        let mut worst: Vec<_> = self.outcomes.iter().filter(serious).collect();
-        worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
-        worst
-    }
-}
-
-impl PlayedCampaign for PlayedLine {
-    fn name(&self) -> &str {
-        &self.name
+    fn name(&self) -> String {
+        self.case.name()
     }
 
-    fn classes(&self) -> &'static [OutcomeClass] {
-        &self.table.classes
+    fn disturbed(&self) -> Option<&str> {
+        Some(&self.case.disturbed)
     }
 
-    fn count(&self, class: usize) -> u64 {
-        let of_class = |outcome: &&LineOutcome| outcome.class == class;
-        self.outcomes.iter().filter(of_class).count() as u64
+    fn happened(&self) -> String {
+        self.happened.clone()
     }
 
-    fn cases(&self) -> u64 {
-        self.outcomes.len() as u64
+    fn json(&self) -> Value {
+        let unit = self.table.units.trim_end_matches('s');
+        json!({
+            unit: self.case.disturbed, "steps": self.steps, "troubles": self.troubles,
+        })
     }
 
-    fn pinned(&self) -> &[(&'static str, u64)] {
-        &self.expect
-    }
-
-    fn size(&self) -> [(String, u64); 2] {
-        let (first, rest) = self.table.units.split_at(1);
-        let units = first.to_uppercase() + rest;
-        [("Drives".to_owned(), 1), (units, self.count as u64)]
-    }
-
-    fn table(&self) -> String {
-        report::table(self)
-    }
-
-    fn lines(&self, class: usize) -> String {
-        report::only(self, class)
-    }
-
-    fn json(&self, class: Option<usize>) -> serde_json::Value {
-        report::json(self, class)
-    }
-
-    fn section(&self, number: usize) -> Section {
-        html::section(number, self)
+    /// A row for each thing that was disturbed, a column a fault. Colours only repeat the letters.
+    fn maps(played: &Played<Self>) -> Vec<(String, Html)> {
+        let Some(first) = played.outcomes.first() else {
+            return Vec::new();
+        };
+        let mut faults: Vec<&str> = Vec::new();
+        for outcome in &played.outcomes {
+            if !faults.contains(&outcome.case.fault.as_str()) {
+                faults.push(&outcome.case.fault);
+            }
+        }
+        let mut html = Html::new();
+        html.element("table", &[], |html| {
+            html.line("caption", &[], "The class of each case");
+            let mut heads = vec!["Number", first.table.heading];
+            heads.extend(&faults);
+            html.heads(&heads);
+            for row in played
+                .outcomes
+                .chunk_by(|a, b| a.case.place == b.case.place)
+            {
+                html.element("tr", &[], |html| {
+                    html.line("th", &[("scope", &"row")], row[0].case.place);
+                    html.line("td", &[], &row[0].case.disturbed);
+                    for fault in &faults {
+                        match row.iter().find(|outcome| outcome.case.fault == *fault) {
+                            Some(outcome) => {
+                                let class = played.of(outcome);
+                                html.line("td", &[("class", &class.colour())], class.letter)
+                            }
+                            None => html.line("td", &[], ""),
+                        }
+                    }
+                });
+            }
+        });
+        let heading = format!("Where: faults across, {} down", played.units);
+        vec![(heading, html)]
     }
 }

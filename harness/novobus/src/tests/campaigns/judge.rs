@@ -174,6 +174,7 @@ fn the_judge_finds_a_wrong_classification() {
     };
     let outcome = |evidence: CaseEvidence| CaseOutcome {
         case,
+        drives: 2,
         class: evidence.class(&case.links()).expect("a class"),
         evidence,
     };

@@ -5,8 +5,8 @@ mod judge;
 
 use crate::campaign::class::{CaseClass, WrongValue};
 use crate::campaign::find::{find, names};
+use crate::campaign::html::by_place;
 use crate::campaign::pairs::Apart;
-use crate::campaign::report::{json, table};
 use crate::campaign::{Campaign, CaseFaults, PlayedCampaign};
 use crate::language::read::RingScenario;
 use crate::link::BesideTheBus as _;
@@ -61,7 +61,7 @@ fn small_campaigns_have_the_figures_that_they_pin() {
     for name in SMALL {
         let finished = run(&built_in(name));
         assert_eq!(finished.differs(), [], "{name}");
-        snapshot(name, &table(&finished));
+        snapshot(name, &finished.table());
     }
 }
 
@@ -195,8 +195,8 @@ fn two_runs_give_the_same_bytes_on_any_number_of_threads() {
     let campaign = built_in("9.9-silence");
     let text = |threads| {
         let finished = campaign.run(threads, &|_| {}).expect("classes");
-        let json = json(&finished, None).to_string();
-        table(&finished) + &json
+        let json = finished.json(None).to_string();
+        finished.table() + &json
     };
     let one = text(1);
     assert_eq!(one, text(1));
@@ -321,7 +321,7 @@ fn a_replay_is_the_case() {
 #[test]
 fn cases_by_link_and_byte() {
     let finished = run(&built_in("9.9-silence"));
-    let map = finished.by_place();
+    let map = by_place(&finished);
     // Four links, 57 bytes, and eleven faults at each.
     assert_eq!(map.len(), 4 * 57);
     assert!(
@@ -334,7 +334,7 @@ fn cases_by_link_and_byte() {
             .sum::<u64>()
     };
     for class in CaseClass::ALL {
-        assert_eq!(of(class), finished.count(class), "{class}");
+        assert_eq!(of(class), finished.count(class as usize), "{class}");
     }
 }
 
