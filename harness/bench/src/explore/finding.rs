@@ -114,9 +114,13 @@ fn json_of(path: &Path) -> PathBuf {
 /// The bus of a finding, by its name; that of rings says none.
 #[must_use]
 pub fn bus_of(path: &Path) -> Option<BusName> {
-    let text = read_text(&json_of(path)).ok()?;
-    let finding: serde_json::Value = serde_json::from_str(&text).ok()?;
-    let name = finding.get("setup")?.get("bus")?.as_str()?;
+    bus_in(&read_text(&json_of(path)).ok()?)
+}
+
+/// The bus that the JSON of a finding, or of the settings of a run, names.
+pub(super) fn bus_in(text: &str) -> Option<BusName> {
+    let json: serde_json::Value = serde_json::from_str(text).ok()?;
+    let name = json.get("setup")?.get("bus")?.as_str()?;
     let known = BusName::NAMES.iter().find(|(known, _)| *known == name);
     known.map(|(_, bus)| *bus)
 }

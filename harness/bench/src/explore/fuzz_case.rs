@@ -1,14 +1,20 @@
 //! What a bus implements so that a run can explore it: the conversation as a value, and how to make, compare and describe it.
 
 use super::confirm::Confirmation;
-use super::{ExploreError, Finding, FuzzSettings, Pool, Rehearsal, Swarm, Target};
+use super::{ExploreError, Finding, FuzzSettings, KeptRun, Pool, Rehearsal, Swarm, Target};
 use crate::explore::Dice;
+use crate::html::Html;
 use crate::manual::Manual;
+use crate::scenario::problem::Problems;
+use crate::scenario::settled::Settled;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::ScenarioHead;
+use crate::shown::SegmentReport;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
-use std::path::Path;
+use std::sync::Arc;
 
 /// Something that a conversation can have.
 pub trait Spiced: Copy + Ord + Debug + 'static {
@@ -53,6 +59,8 @@ pub trait FuzzCase:
 {
     /// The manual of its bus.
     const MANUAL: Manual;
+    /// How what its bus carries is shown.
+    const REPORT: &'static dyn SegmentReport;
 
     /// What conversations of a run may have, and with what drives.
     type Scope: Clone + Debug;
@@ -140,10 +148,21 @@ pub trait FuzzCase:
         known: &BTreeMap<String, u8>,
     ) -> Result<JudgedAgain, ExploreError>;
 
-    /// The page of the run in a folder; `None` where its cases have none.
-    fn page(folder: &Path) -> Option<Result<String, ExploreError>> {
-        let _no_page = folder;
-        None
+    /// Reads and settles the scenario of a finding.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    fn settled(source: &Source) -> Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
+
+    /// The deviations that are planted, as header lines.
+    fn planted(setup: &Self::Setup) -> Vec<String>;
+
+    /// What the kept cases of a run have reached, with a heading, for its page; `None` where that is not counted.
+    ///
+    /// # Errors
+    /// A case of the record is damaged.
+    fn reached(_kept: &KeptRun<Self>) -> Result<Option<(String, Html)>, ExploreError> {
+        Ok(None)
     }
 
     /// Whether a finding that was read is within the bounds of what a run writes.

@@ -14,6 +14,7 @@ pub mod files;
 pub mod finding;
 pub mod fuzz_case;
 pub mod line;
+pub mod page;
 pub mod planted;
 pub mod pool;
 pub mod promote;
@@ -35,6 +36,8 @@ pub use fuzz_case::{Differing, FuzzCase, JudgedAgain, Spiced};
 pub use planted::Planted;
 pub use planted::is_first;
 pub use pool::{MOST_KEPT, Pool, by_novelty};
-pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read_as, rig_of};
+pub use record::{
+    FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, bus_of_run, read_as, rig_of,
+};
 pub use swarm::Swarm;
 pub use target::{Rehearsal, Target, Tried};

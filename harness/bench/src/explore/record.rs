@@ -6,6 +6,8 @@
 use super::FuzzCase;
 use super::error::ExploreError;
 use super::files::read_text;
+use super::finding::bus_in;
+use crate::bus_name::BusName;
 use crate::regular;
 use rustix::fs::FlockOperation;
 use serde::{Deserialize, Serialize};
@@ -238,6 +240,12 @@ pub fn rig_of(folder: &Path) -> Result<String, ExploreError> {
             path.display()
         ))
     })
+}
+
+/// The bus of the run in a folder, by its name; a run on rings says none.
+#[must_use]
+pub fn bus_of_run(folder: &Path) -> Option<BusName> {
+    bus_in(record_of(folder).ok()?.lines().next()?)
 }
 
 /// The text of the record in a folder.

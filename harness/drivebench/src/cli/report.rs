@@ -7,7 +7,7 @@ use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{writable, write};
 use crate::evidence::{RIG, derive};
-use crate::explore::RECORD;
+use crate::explore::{RECORD, bus_of_run};
 
 /// Makes the reports of a folder again.
 pub(crate) fn report(arguments: &ReportArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -44,8 +44,8 @@ fn explored(arguments: &ReportArguments, output: &mut Output) -> Exit {
         );
         return Exit::Usage;
     }
-    let page = fuzz_of(BusName::DEFAULT).and_then(|fuzz| fuzz.page);
-    let text = match page.map(|page| page(&arguments.folder)) {
+    let bus = bus_of_run(&arguments.folder).unwrap_or(BusName::DEFAULT);
+    let text = match fuzz_of(bus).map(|fuzz| (fuzz.page)(&arguments.folder)) {
         Some(Ok(text)) => text,
         None => return Exit::Usage,
         Some(Err(error)) => {

@@ -9,6 +9,7 @@ use super::text::steps;
 use crate::judge::Symptom;
 use crate::language::Nordac;
 use crate::manual::MANUAL;
+use crate::report::TelegramReport;
 use crate::rig::rate;
 use crate::serve;
 use crate::simulate::Setup;
@@ -21,6 +22,7 @@ use harness_bench::manual::Manual;
 use harness_bench::rig::Rig;
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
+use harness_bench::shown::SegmentReport;
 use harness_proto::nordac::{PpoType, Properties};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Instant;
@@ -62,6 +64,7 @@ impl Differing for TelegramDifference {
 impl LineBus for Nordac {
     const BUS: BusName = BusName::Nordac;
     const MANUAL: Manual = MANUAL;
+    const REPORT: &'static dyn SegmentReport = &TelegramReport;
     const USUAL_SECTION: &'static str = "3.1";
     const DRIVES: &'static str = "NORDAC inverters";
     const DRIVE: &'static str = "slave";
@@ -76,6 +79,7 @@ impl LineBus for Nordac {
         TelegramSpice::Services,
     ];
 
+    type Words = Self;
     type What = TelegramActKind;
     type Spice = TelegramSpice;
     type Station = Station;

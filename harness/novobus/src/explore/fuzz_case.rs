@@ -4,33 +4,42 @@ use super::case::{Act, Case};
 use super::confirm::judged_again;
 use super::confirm::on_ring;
 use super::generate::{CaseScope, Generator};
+use super::html::reached;
 use super::judge::Judge;
 use super::mutate::mutate;
 use super::on_sim::OnSim;
 use super::oracle::Difference;
-use super::page::page;
 use super::play::MasterView;
 use super::promote::{INPUTS, input};
 use super::setup::{RingSetup, planted_line};
 use super::text::{Surroundings, text};
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
-use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
+use crate::explore::{Finding, FuzzSettings, KeptRun, Pool, Rehearsal, Swarm};
+use crate::language::Novobus;
 use crate::manual::MANUAL;
+use crate::report::ring::RingReport;
 use harness_bench::counted::counted;
 use harness_bench::explore::{
     Confirmation, Dice, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
+use harness_bench::html::Html;
 use harness_bench::manual::Manual;
+use harness_bench::scenario::problem::Problems;
+use harness_bench::scenario::settled::{BenchSize, Settled, settle};
+use harness_bench::scenario::source::Source;
+use harness_bench::scenario::syntax::ScenarioHead;
+use harness_bench::shown::SegmentReport;
 use harness_proto::novobus::address::RingSize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::sync::Arc;
 
 /// Maximum number of attempts of a finding.
 const MOST_ATTEMPTS: usize = 1_000;
 
 impl FuzzCase for Case {
     const MANUAL: Manual = MANUAL;
+    const REPORT: &'static dyn SegmentReport = &RingReport;
 
     type Scope = CaseScope;
     type Setup = RingSetup;
@@ -155,8 +164,16 @@ impl FuzzCase for Case {
         played_again(finding, about, known, &mut target)
     }
 
-    fn page(folder: &Path) -> Option<Result<String, ExploreError>> {
-        Some(page(folder))
+    fn settled(source: &Source) -> Result<(ScenarioHead, Arc<dyn Settled>), Problems> {
+        settle::<Novobus>(source, BenchSize::Own)
+    }
+
+    fn planted(setup: &RingSetup) -> Vec<String> {
+        setup.deviates.iter().map(planted_line).collect()
+    }
+
+    fn reached(kept: &KeptRun) -> Result<Option<(String, Html)>, ExploreError> {
+        reached(kept).map(Some)
     }
 
     fn is_sound(finding: &Finding) -> bool {

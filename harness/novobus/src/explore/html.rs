@@ -1,200 +1,66 @@
-//! The page of a run of fuzzing: what was found, what was reached, how it went on.
+//! What the page of a run says of rings: which transitions of a drive's end of the bus its cases have reached.
 
-use super::setup::planted_line;
-use crate::explore::FuzzSettings;
-use harness_bench::counted::counted;
-use harness_bench::explore::Progress;
+use super::KeptRun;
+use super::case::Case;
+use super::play::play;
+use harness_bench::explore::{ExploreError, LogLine};
 use harness_bench::html::Html;
-use harness_bench::report::chart::{Along, Chart, Curve, Points};
-use harness_bench::report::html::{Section, page};
-use harness_bench::shown::{ShownScenario, colour};
-use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
+use harness_bench::link::Link as _;
+use harness_proto::line::Received;
+use harness_sim::novobus::device::Device as _;
+use harness_sim::novobus::transitions::{
+    Event, Reached, State, Transition, Watched, why_unreachable,
+};
+use harness_sim::record::Channel;
 
-/// Progress shown in a table at most; of a longer run every n-th line is.
-const ROWS: usize = 40;
-
-/// What a run of fuzzing has come to.
-#[derive(Clone, Debug)]
-pub(crate) struct Explored<'e> {
-    /// What the run is.
-    pub about: &'e FuzzSettings,
-    /// The progress of the run over time; the last entry is the current state.
-    pub history: &'e [Progress],
-    /// After how many cases how many features had been seen.
-    pub features: &'e [(u64, u64)],
-    /// The protocol transitions that the kept cases reach on the model.
-    pub reached: &'e Reached,
-    /// What was found, each with its picture.
-    pub findings: Vec<ShownScenario>,
-    /// The command that continues the run.
-    pub again: &'e str,
-}
-
-/// The page of a run.
-#[must_use]
-pub(crate) fn explored(run: Explored<'_>) -> String {
-    let mut front = Html::new();
-    front.element("section", &[("aria-labelledby", &"summary")], |html| {
-        html.line("h2", &[("id", &"summary")], "Summary");
-        facts(html, &run);
-        findings(html, &run.findings);
-    });
-    front.element("section", &[("aria-labelledby", &"course")], |html| {
-        html.line("h2", &[("id", &"course")], "How it went on");
-        course(html, &run);
-    });
-    front.element("section", &[("aria-labelledby", &"reached")], |html| {
-        html.line("h2", &[("id", &"reached")], "Transitions reached");
-        transitions(html, run.reached);
-    });
-    let sections: Vec<Section> = run
-        .findings
-        .into_iter()
-        .map(|shown| shown.section)
-        .collect();
-    page("drivebench: fuzzing", &front, &sections)
-}
-
-fn facts(html: &mut Html, run: &Explored<'_>) {
-    let about = run.about;
-    let last = run.history.last().copied().unwrap_or_default();
-    html.element("ul", &[("class", &"counts")], |html| {
-        let class = if run.findings.is_empty() {
-            "good"
-        } else {
-            "bad"
-        };
-        html.line(
-            "li",
-            &[("class", &class)],
-            counted(run.findings.len(), "finding"),
-        );
-        html.line("li", &[], counted(last.cases, "case"));
-    });
-    html.element("dl", &[], |html| {
-        let mut fact = |name: &str, value: &dyn std::fmt::Display| {
-            html.line("dt", &[], name);
-            html.line("dd", &[], value);
-        };
-        fact("Rig", &about.rig);
-        fact("Drives", &about.drives);
-        if let Some(second) = about.second {
-            fact("Drives of ring 2", &second);
+/// The transitions that the kept cases of a run reach, with a heading.
+///
+/// # Errors
+/// A case of the record is too large, or the model cannot be made.
+pub(super) fn reached(kept: &KeptRun) -> Result<(String, Html), ExploreError> {
+    let mut reached = Reached::default();
+    for line in &kept.lines {
+        if let LogLine::Kept { case, .. } = line {
+            reach(kept, case, &mut reached)?;
         }
-        fact("Seed", &about.seed);
-        for planted in &about.setup.deviates {
-            fact("Planted", &planted_line(planted));
-        }
-        fact(
-            "Confirmed",
-            &format_args!("seen again {} of {} times", about.confirm, about.of),
-        );
-        fact("Cases may have", &about.spices.join(", "));
-        fact(
-            "Not sent",
-            &format_args!("{}: not allowed or not possible here", last.not_sent),
-        );
-        fact("Repeats of findings", &last.repeats);
-        fact(
-            "On the line",
-            &format_args!("{:.3} s", seconds(last.wire_ns)),
-        );
-        fact("Go on", &run.again);
-    });
-}
-
-fn findings(html: &mut Html, all: &[ShownScenario]) {
-    if all.is_empty() {
-        return;
     }
-    html.element("table", &[], |html| {
-        html.line("caption", &[], "Findings");
-        html.heads(&["Verdict", "Finding", "What differed"]);
-        for ShownScenario { row, section } in all {
-            html.element("tr", &[], |html| {
-                html.line("td", &[("class", &colour(row.verdict))], row.verdict);
-                html.element("th", &[("scope", &"row")], |html| {
-                    html.line("a", &[("href", &format!("#{}", section.id))], &row.name);
-                });
-                html.line("td", &[], &row.title);
-            });
-        }
-    });
+    let mut html = Html::new();
+    transitions(&mut html, &reached);
+    Ok(("Transitions reached".to_owned(), html))
 }
 
-fn curve(name: &str, held: bool, points: Points) -> Curve {
-    Curve {
-        name: name.to_owned(),
-        held,
-        points,
-        ..Curve::default()
+/// What the drives of the model go through in a case: each hears again what its link carried.
+fn reach(kept: &KeptRun, case: &Case, reached: &mut Reached) -> Result<(), ExploreError> {
+    if !case.is_bounded() {
+        return Err(ExploreError::File(
+            "a kept case in the record is larger than a case may be".to_owned(),
+        ));
     }
-}
-
-fn figure(html: &mut Html, title: &str, (id, along, end): (&str, Along, f64), curve: Curve) {
-    html.element("figure", &[], |html| {
-        html.line("figcaption", &[], title);
-        Chart {
-            id,
-            title,
-            along,
-            ends: Some((0.0, end)),
-            curves: &[curve],
-            ..Chart::default()
-        }
-        .draw(html);
-    });
-}
-
-#[expect(clippy::cast_precision_loss, reason = "points of a curve")]
-fn course(html: &mut Html, run: &Explored<'_>) {
-    let last = run.history.last().copied().unwrap_or_default();
-    let executions = run
-        .history
+    let mut link = kept.about.setup.model(&case.sizes())?;
+    play(&mut link, case);
+    for link in link
+        .trace(case.ring())
+        .channels
         .iter()
-        .map(|progress| (seconds(progress.wire_ns) * 1e3, Some(progress.cases as f64)));
-    let features = run
-        .features
-        .iter()
-        .map(|(cases, all)| (*cases as f64, Some(*all as f64)));
-    let title = "Cases against the time on the line";
-    let end = seconds(last.wire_ns) * 1e3;
-    let cases = curve("cases", false, executions.collect());
-    figure(html, title, ("executions", Along::Time, end), cases);
-    if !run.features.is_empty() {
-        let title = "Features of the bus seen against cases";
-        let end = last.cases as f64;
-        let seen = curve("features", true, features.collect());
-        figure(html, title, ("features", Along::Count("cases"), end), seen);
+        .filter(|link| link.to.is_some())
+    {
+        reached.join(&heard(link));
     }
-    progress(html, run.history);
+    Ok(())
 }
 
-fn progress(html: &mut Html, history: &[Progress]) {
-    html.element("details", &[], |html| {
-        html.line("summary", &[], "As a table");
-        html.element("table", &[], |html| {
-            html.line("caption", &[], "Progress");
-            html.heads(&["Cases", "Not sent", "Repeats", "On the line"]);
-            for progress in history.iter().step_by(history.len().div_ceil(ROWS).max(1)) {
-                html.element("tr", &[], |html| {
-                    html.line("td", &[("class", &"n")], progress.cases);
-                    html.line("td", &[("class", &"n")], progress.not_sent);
-                    html.line("td", &[("class", &"n")], progress.repeats);
-                    html.line(
-                        "td",
-                        &[("class", &"n")],
-                        format_args!("{:.3} s", seconds(progress.wire_ns)),
-                    );
-                });
-            }
-        });
-    });
-}
-
-#[expect(clippy::cast_precision_loss, reason = "seconds for people")]
-fn seconds(nanos: u64) -> f64 {
-    nanos as f64 / 1e9
+fn heard(link: &Channel) -> Reached {
+    let mut drive = Watched::<Reached>::default();
+    for byte in link.octets() {
+        if let Some(value) = byte.received {
+            let received = Received {
+                byte: value,
+                error: byte.error,
+            };
+            drive.receive(byte.at, received);
+        }
+    }
+    drive.reached().clone()
 }
 
 /// The matrix of a drive's end of the bus (ND21 9.1-9.9): a row a state, a column an event.

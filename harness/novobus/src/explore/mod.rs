@@ -16,7 +16,6 @@ mod on_rig;
 mod on_sim;
 mod oracle;
 mod order;
-mod page;
 mod play;
 mod promote;
 mod setup;
@@ -39,8 +38,9 @@ pub(crate) use on_rig::OnRig;
 pub(crate) use on_sim::OnSim;
 #[cfg(test)]
 pub(crate) use oracle::{Difference, against_reference, beside};
-pub(crate) use page::page;
-pub(crate) use play::{MasterView, play};
+pub(crate) use play::MasterView;
+#[cfg(test)]
+pub(crate) use play::play;
 pub(crate) use setup::RingSetup;
 pub(crate) use setup::planted_setup;
 pub(crate) use spice::Spice;
@@ -53,8 +53,6 @@ pub(crate) type FuzzSettings = harness_bench::explore::FuzzSettings<Case>;
 pub(crate) type FuzzRun = harness_bench::explore::FuzzRun<Case>;
 /// A run on rings that was read.
 pub(crate) type KeptRun = harness_bench::explore::KeptRun<Case>;
-/// A line of the record of a run on rings.
-pub(crate) type LogLine = harness_bench::explore::LogLine<Case>;
 /// The cases that a run on rings keeps.
 pub(crate) type Pool = harness_bench::explore::Pool<Case>;
 /// What a model of a ring makes of a case.

@@ -9,6 +9,7 @@ use super::text::steps;
 use crate::judge::FrameSymptom;
 use crate::language::Unitek;
 use crate::manual::MANUAL;
+use crate::report::FrameReport;
 use crate::rig::axes;
 use crate::serve;
 use crate::simulate::Setup;
@@ -20,6 +21,7 @@ use harness_bench::manual::Manual;
 use harness_bench::rig::Rig;
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
+use harness_bench::shown::SegmentReport;
 use harness_proto::can::Frame;
 use harness_proto::time::Instant;
 use harness_proto::unitek::Register;
@@ -62,6 +64,7 @@ impl Differing for FrameDifference {
 impl LineBus for Unitek {
     const BUS: BusName = BusName::Unitek;
     const MANUAL: Manual = MANUAL;
+    const REPORT: &'static dyn SegmentReport = &FrameReport;
     const USUAL_SECTION: &'static str = "5.2";
     const DRIVES: &'static str = "UNITEK drives";
     const DRIVE: &'static str = "drive";
@@ -72,6 +75,7 @@ impl LineBus for Unitek {
     };
     const NEEDED: &'static [FrameSpice] = &[FrameSpice::Read, FrameSpice::Cycles];
 
+    type Words = Self;
     type What = FrameActKind;
     type Spice = FrameSpice;
     /// Its number, and the identifier on which it receives.

@@ -19,12 +19,6 @@ impl<B: LineRig> ExploredCase for LineTalk<B> {
         if arguments.whole {
             return Some(format!("--whole is for rings; leave it out for {drives}"));
         }
-        if arguments.html.is_some() {
-            return Some(
-                "--html is for runs on rings; the findings of this run are scenarios: `drivebench run --html` shows them"
-                    .to_owned(),
-            );
-        }
         let mut planted = arguments.deviates.iter();
         let second = planted.any(|drive| drive.ring != 0);
         second.then(|| {

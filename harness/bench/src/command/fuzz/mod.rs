@@ -14,6 +14,7 @@ use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::exit_of;
 use crate::evidence::Signer;
+use crate::explore::page::page;
 use crate::explore::promote::Plays;
 use crate::explore::{ExploreError, FuzzCase, FuzzRun};
 use crate::rig::Rig;
@@ -41,8 +42,8 @@ pub struct FuzzCommands {
     pub verify: Verify,
     /// `fuzz power`, where the bus has it.
     pub power: Option<PowerRun>,
-    /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
-    pub page: Option<Page>,
+    /// The page of a run, made from its folder.
+    pub page: Page,
 }
 
 impl FuzzCommands {
@@ -55,7 +56,7 @@ impl FuzzCommands {
             promote: promote::keep::<C>,
             verify: verify_as::<C>,
             power: None,
-            page: None,
+            page: page::<C>,
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::command::page::write;
 use crate::command::rig_failure::use_options;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal, unseal};
+use crate::explore::page::page;
 use crate::explore::{
     Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, Planted, RunEnd, Target,
     read_as,
@@ -271,10 +272,10 @@ fn explore<C: FuzzCase>(
         return Ok(exit_of_cases(&campaign).with_rig_error());
     }
     if let Some(path) = &arguments.html {
-        match C::page(&folder) {
-            Some(Ok(text)) if !write(path, &text, output) => return Ok(Exit::RigError),
-            Some(Err(error)) => return Ok(tell(&error, output)),
-            Some(Ok(_)) | None => {}
+        match page::<C>(&folder) {
+            Ok(text) if !write(path, &text, output) => return Ok(Exit::RigError),
+            Ok(_) => {}
+            Err(error) => return Ok(tell(&error, output)),
         }
     }
     Ok(exit_of_cases(&campaign))

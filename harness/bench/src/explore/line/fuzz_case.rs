@@ -8,9 +8,15 @@ use crate::explore::{
     Pool, Swarm, is_first, played_again,
 };
 use crate::manual::Manual;
+use crate::scenario::problem::Problems;
+use crate::scenario::settled::{BenchSize, Settled, settle};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::ScenarioHead;
+use crate::shown::SegmentReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Nothing: simulated drives do the same again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,6 +24,7 @@ pub enum NoAttempt {}
 
 impl<B: LineBus> FuzzCase for LineTalk<B> {
     const MANUAL: Manual = B::MANUAL;
+    const REPORT: &'static dyn SegmentReport = B::REPORT;
 
     type Scope = LineScope<B>;
     type Setup = LineSetup;
@@ -109,6 +116,14 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
         }
         let mut target = OnLine::<B>::new(finding.setup.under_test::<B>()?);
         played_again(finding, about, known, &mut target)
+    }
+
+    fn settled(source: &Source) -> Result<(ScenarioHead, Arc<dyn Settled>), Problems> {
+        settle::<B::Words>(source, BenchSize::Own)
+    }
+
+    fn planted(setup: &LineSetup) -> Vec<String> {
+        setup.deviates.iter().map(Planted::line::<B>).collect()
     }
 
     fn is_sound(finding: &Finding<Self>) -> bool {

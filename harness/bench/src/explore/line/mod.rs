@@ -26,8 +26,10 @@ use crate::bus_name::BusName;
 use crate::explore::{Dice, Differing, Spiced};
 use crate::manual::Manual;
 use crate::rig::Rig;
+use crate::scenario::language::Language;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
+use crate::shown::SegmentReport;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Debug;
@@ -36,6 +38,8 @@ use std::fmt::Debug;
 pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     const BUS: BusName;
     const MANUAL: Manual;
+    /// How what the line carries is shown.
+    const REPORT: &'static dyn SegmentReport;
     /// The section whose table the scenario of a finding covers where the section of the finding has none.
     const USUAL_SECTION: &'static str;
     /// What its drives are called, with the name of their kind.
@@ -47,6 +51,8 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     /// Of these spices a round has at least one; the first one if chance takes none.
     const NEEDED: &'static [Self::Spice];
 
+    /// Its language.
+    type Words: Language;
     /// What can happen in a conversation.
     type What: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned;
     /// Something that a conversation can have.

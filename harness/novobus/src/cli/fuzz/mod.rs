@@ -5,7 +5,7 @@ mod power;
 use super::give_back_session as give_back;
 use crate::explore::{
     Act, ActKind, Case, CaseScope, Finding, MOST_BYTES, OnRig, OnSim, RingScope, RingSetup, Spice,
-    page, planted_setup,
+    planted_setup,
 };
 use crate::language::run::over_bus::start_anew;
 use crate::rig::sim;
@@ -31,7 +31,6 @@ use std::path::Path;
 /// How rings are explored.
 pub(crate) const COMMANDS: FuzzCommands = FuzzCommands {
     power: Some(power::power),
-    page: Some(page),
     ..FuzzCommands::of::<Case>()
 };
 

@@ -3,11 +3,11 @@
 use super::{FindingList, about, bounds, scope_of};
 use crate::explore::shrink::Subject;
 use crate::explore::{
-    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
+    Case, Finding, FuzzRun, FuzzSettings, OnSim, OtherRing, RingSetup, beside, play,
 };
 use crate::language::syntax::Header;
 use harness_bench::explore::smaller::shrink;
-use harness_bench::explore::{Differing as _, FuzzCase as _, Planted, Target, by_novelty};
+use harness_bench::explore::{Differing as _, FuzzCase as _, LogLine, Planted, Target, by_novelty};
 use harness_bench::link::Line as _;
 use harness_bench::link::Octets;
 use harness_proto::time::Span;
@@ -146,7 +146,7 @@ fn forms_of_cases() {
     assert_eq!((planted.ring, planted.drive), (0, 1));
     let run = "{\"kind\":\"run\",\"schema\":1,\"rig\":\"sim:3\",\"drives\":3,\"ports\":false,\"seed\":1,\"confirm\":2,\"of\":3,\
                \"setup\":{\"header\":[],\"deviates\":[]},\"spices\":[]}";
-    let line: LogLine = serde_json::from_str(run).expect("a line");
+    let line: LogLine<Case> = serde_json::from_str(run).expect("a line");
     assert_eq!(line, LogLine::Run(about(&RingSetup::default(), 1)));
     assert_eq!(serde_json::to_string(&line).expect("a form"), run);
     for drives in [0, 251] {
