@@ -19,17 +19,6 @@ const MOST_LATE: usize = 4;
 /// How often a scenario that does not pass is played on a bus of frames in real time: a busy computer moves frames against each other.
 const ON_A_SEGMENT: u8 = 3;
 
-/// How often a scenario that does not pass is played, at most: as often as the rig's file says, and in real time often enough to tell a drive
-/// from a busy computer.
-pub fn attempts_of(rig: &Rig, real_time: bool, qualifies: bool) -> usize {
-    let least = match (real_time, rig.port().is_some()) {
-        (true, true) => ON_A_SEGMENT,
-        (true, false) if qualifies => 2,
-        _ => 1,
-    };
-    usize::from(rig.file.retry.attempts.max(least))
-}
-
 /// How often drives are made ready before one that gives no answer has failed.
 const MOST_UNREADY: usize = 3;
 
@@ -218,6 +207,8 @@ fn unanswered_each_time(attempts: &[Attempt]) -> Option<&str> {
 pub struct RetryRule {
     /// How late a byte may be; zero where time is virtual.
     tolerance: Span,
+    /// How often a scenario that does not pass is played, at most.
+    most: usize,
     /// How often drives are made ready where one gives no answer.
     unready: usize,
     /// Which drives gave no answer at every attempt at a scenario: it is the drive, then, and not the computer.
@@ -225,10 +216,22 @@ pub struct RetryRule {
 }
 
 impl RetryRule {
-    /// On a rig with this tolerance; zero where time is virtual: no computer is busy, and drives that are not ready never will be.
-    pub fn new(tolerance: Span) -> Self {
+    /// On a rig with this tolerance: as often as its file says, and in real time often enough to tell a drive from a busy computer.
+    pub fn of(rig: &Rig, tolerance: Span, qualifies: bool) -> Self {
+        let least = match (tolerance > Span::ZERO, rig.port().is_some()) {
+            (true, true) => ON_A_SEGMENT,
+            (true, false) if qualifies => 2,
+            _ => 1,
+        };
+        Self::new(tolerance, usize::from(rig.file.retry.attempts.max(least)))
+    }
+
+    /// With this tolerance; zero where time is virtual: no computer is busy, and drives that are not ready never will be. A scenario that
+    /// does not pass is played `most` times.
+    pub fn new(tolerance: Span, most: usize) -> Self {
         Self {
             tolerance,
+            most,
             unready: if tolerance > Span::ZERO {
                 MOST_UNREADY
             } else {
@@ -238,8 +241,8 @@ impl RetryRule {
         }
     }
 
-    /// Whether there is another attempt behind these; `most` is how often the rig's file has one that does not pass.
-    pub fn after(&mut self, attempts: &[Attempt], most: usize) -> bool {
+    /// Whether there is another attempt after these.
+    pub fn after(&mut self, attempts: &[Attempt]) -> bool {
         let Some(last) = attempts.last() else {
             return true;
         };
@@ -268,7 +271,7 @@ impl RetryRule {
                     .iter()
                     .filter(|attempt| attempt.failed())
                     .partition(|attempt| attempt.outcome.shows_nothing);
-                failed.len() < most && late.len() < most.max(MOST_LATE)
+                failed.len() < self.most && late.len() < self.most.max(MOST_LATE)
             }
         }
     }
@@ -333,7 +336,8 @@ mod tests {
     /// How many attempts there are where each ends like this, the last over and over.
     fn attempts(again: &mut RetryRule, most: usize, ends: &[(Verdict, &str)]) -> usize {
         let mut played: Vec<Attempt> = Vec::new();
-        while again.after(&played, most) {
+        again.most = most;
+        while again.after(&played) {
             let end = ends.get(played.len()).or(ends.last());
             let (verdict, remark) = *end.expect("an end");
             played.push(attempt(verdict, remark));
@@ -343,7 +347,7 @@ mod tests {
 
     #[test]
     fn whatever_does_not_pass_is_played_again_as_often_as_it_may_be() {
-        let again = &mut RetryRule::new(TOLERANCE);
+        let again = &mut RetryRule::new(TOLERANCE, 1);
         assert_eq!(attempts(again, 3, &[(Passed, "")]), 1);
         assert_eq!(attempts(again, 3, &[(Verdict::RigError, "")]), 1);
         assert_eq!(attempts(again, 1, &[(Failed, "")]), 1);
@@ -373,8 +377,8 @@ mod tests {
     /// Bytes that are late at other places each time were late in the computer: a third attempt shows nothing else.
     #[test]
     fn bytes_that_are_late_elsewhere_end_the_attempts() {
-        let mut again = RetryRule::new(TOLERANCE);
-        let mut more = |played: &[Attempt]| again.after(played, 3);
+        let mut again = RetryRule::new(TOLERANCE, 3);
+        let mut more = |played: &[Attempt]| again.after(played);
         assert!(more(&[late("a", 40)]));
         assert!(more(&[late("a", 40), late("a", 45)]));
         assert!(!more(&[late("a", 40), late("b", 40)]));
@@ -390,8 +394,7 @@ mod tests {
             late.outcome.shows_nothing = true;
             late
         };
-        let mut again = RetryRule::new(TOLERANCE);
-        let mut more = |played: &[Attempt], most| again.after(played, most);
+        let more = |played: &[Attempt], most| RetryRule::new(TOLERANCE, most).after(played);
         assert!(more(&[late()], 1));
         assert!(more(&[late(), late(), late()], 2));
         assert!(!more(&[late(), late(), late(), late()], 2));
@@ -404,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_silent_drive_is_made_ready_again_as_the_computer_may_have_disturbed_it() {
-        let again = &mut RetryRule::new(TOLERANCE);
+        let again = &mut RetryRule::new(TOLERANCE, 1);
         assert_eq!(attempts(again, 1, &[(Failed, DIFFERS)]), 1);
         let disturbed = [(Failed, SILENT), (Passed, "")];
         assert_eq!(attempts(again, 1, &disturbed), 2);
@@ -418,7 +421,7 @@ mod tests {
 
     #[test]
     fn nothing_disturbs_a_drive_where_time_is_virtual() {
-        let again = &mut RetryRule::new(Span::ZERO);
+        let again = &mut RetryRule::new(Span::ZERO, 1);
         assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 

@@ -7,7 +7,7 @@ use super::verify::{JudgedAttempt, OpenedFolder};
 use crate::counted::counted;
 use crate::library::Entry;
 use crate::link::LinkEvent;
-use crate::rig::{Attempt, PlayedScenario, RetryRule, Rig, attempts_of};
+use crate::rig::{Attempt, PlayedScenario, RetryRule, Rig};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -22,10 +22,11 @@ pub(super) fn differences(
     judged: &[JudgedAttempt<'_>],
     texts: Texts<'_>,
 ) -> Vec<String> {
+    let header = &opened.header;
     let mut settling = Settling {
         opened,
         texts,
-        retries: RetryRule::new(opened.header.tolerance),
+        retries: RetryRule::of(&opened.rig, header.tolerance, header.qualified),
         wrong: Vec::new(),
         verdicts: Vec::new(),
     };
@@ -136,15 +137,13 @@ impl Settling<'_> {
         if header.own_rings || header.schema < 2 || attempts.is_empty() {
             return;
         }
-        let real = header.tolerance > Span::ZERO;
-        let most = attempts_of(&self.opened.rig, real, header.qualified);
         let all = settled(attempts);
-        let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n], most));
+        let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n]));
         let trouble = attempts.iter().any(|attempt| match &attempt.again {
             Ok((_, again)) => again.trouble,
             Err(_) => true,
         });
-        let too_few = self.retries.after(&all, most) && !trouble;
+        let too_few = self.retries.after(&all) && !trouble;
         if too_many || too_few {
             let count = attempts.len();
             self.wrong.push(format!(
@@ -292,7 +291,7 @@ mod tests {
                 };
                 recorded.settles(&again)
             });
-            !RetryRule::new(tolerance).after(&attempts, 3)
+            !RetryRule::new(tolerance, 3).after(&attempts)
         };
         assert!(ends_after(["byte 3", "byte 5"]));
         assert!(!ends_after(["byte 3", "byte 3"]));

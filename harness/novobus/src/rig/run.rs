@@ -20,9 +20,7 @@ use harness_bench::guard::Guarded;
 use harness_bench::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
-use harness_bench::rig::{
-    Attempt, Keeper, PlayedScenario, RetryRule, Rig, SessionError, attempts_of,
-};
+use harness_bench::rig::{Attempt, Keeper, PlayedScenario, RetryRule, Rig, SessionError};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{
     AtMismatch, ByteDifference, Mismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well,
@@ -53,8 +51,6 @@ pub(crate) struct Run<'s> {
     as_they_are: bool,
     /// A scenario that the rig's limits do not permit to its end is skipped, and nothing of it is sent.
     rehearses: bool,
-    /// Whether what does not pass is played once more at least.
-    repeats: bool,
     /// Whether a scenario was played.
     played: bool,
     /// How the bench's own master breaks the manual on this rig, on purpose.
@@ -111,11 +107,10 @@ impl<'s> Run<'s> {
                 looks: None,
             },
             beats: session.ports().map(|ports| ports.beats()),
+            again: RetryRule::of(session.rig(), tolerance, false),
             session,
             twin,
             byte_time,
-            again: RetryRule::new(tolerance),
-            repeats: false,
             played: false,
             as_they_are: false,
             rehearses: true,
@@ -173,8 +168,6 @@ impl<'s> Run<'s> {
         }
         self.remember(plan);
         let mut attempts = Vec::new();
-        let real = self.exactness.tolerance > Span::ZERO;
-        let most = attempts_of(self.session.rig(), real, self.repeats);
         loop {
             let number = attempts.len() + 1;
             if let Some(keeper) = &mut keeper {
@@ -186,7 +179,7 @@ impl<'s> Run<'s> {
                 keeper.ends(number, &attempt);
             }
             attempts.push(attempt);
-            if !self.again.after(&attempts, most) || self.session.link().trouble().is_some() {
+            if !self.again.after(&attempts) || self.session.link().trouble().is_some() {
                 return Ok(PlayedScenario::of(attempts));
             }
         }
@@ -277,7 +270,7 @@ impl<'s> Run<'s> {
     /// Plays from now on what does not pass once more at least, where time is real: what a busy computer has caused does not come
     /// again.
     pub(crate) fn repeat(&mut self) {
-        self.repeats = true;
+        self.again = RetryRule::of(self.session.rig(), self.exactness.tolerance, true);
     }
 
     /// Why a plan is skipped that `lacks` something, or that the guard denies on the model; with all that would let it be played.

@@ -10,9 +10,7 @@ use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
 use crate::rig::session::{RigDrives, RigSession, failed};
-use crate::rig::{
-    Attempt, End, Keeper, PlayedScenario, RetryRule, Rig, SessionError, UseOptions, attempts_of,
-};
+use crate::rig::{Attempt, End, Keeper, PlayedScenario, RetryRule, Rig, SessionError, UseOptions};
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
@@ -127,7 +125,7 @@ impl<P: PortPlayer> PortRun<P> {
         player.shows_life(session.beats());
         player.tells(session.left().clone());
         Self {
-            again: RetryRule::new(P::segment(session.rig(), options.allow_motion).tolerance),
+            again: retries::<P>(session.rig(), options),
             notes: session.left().take_before().into_iter().collect(),
             session,
             player,
@@ -177,7 +175,7 @@ impl<P: PortPlayer> PortRun<P> {
     /// Forgets what is known of the drives: others have used them.
     pub(crate) fn forget_drives(&mut self) {
         let (rig, options) = (self.session.rig(), &self.options);
-        self.again = RetryRule::new(P::segment(rig, options.allow_motion).tolerance);
+        self.again = retries::<P>(rig, options);
         self.player = P::new(rig, options.allow_motion, options.ill_as_well);
         self.player.shows_life(self.session.beats());
         self.player.tells(self.session.left().clone());
@@ -281,8 +279,6 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
         if let Some(skip) = self.player.not_begun(&scenario) {
             return Ok(PlayedScenario::skipped(skip.on_port()));
         }
-        let real = !self.session.rig().is_simulated();
-        let most = attempts_of(self.session.rig(), real, false);
         let mut attempts = Vec::new();
         loop {
             let number = attempts.len() + 1;
@@ -297,7 +293,7 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
                 None => self.attempt(&scenario, &mut forgotten),
             };
             attempts.push(attempt);
-            let more = self.again.after(&attempts, most);
+            let more = self.again.after(&attempts);
             if !more || self.over.is_some() || self.session.link().trouble().is_some() {
                 return Ok(PlayedScenario::of(attempts));
             }
@@ -509,6 +505,12 @@ impl<P: PortPlayer> RecordJudge for PortJudge<P> {
         }
         Ok(repeated)
     }
+}
+
+/// When scenarios are played once more.
+fn retries<P: PortPlayer>(rig: &Rig, options: &UseOptions) -> RetryRule {
+    let segment = P::segment(rig, options.allow_motion);
+    RetryRule::of(rig, segment.tolerance, options.ill_as_well)
 }
 
 /// A scenario of this bus, or why it is not played here.
