@@ -1,7 +1,7 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
-use super::Rig;
-use crate::link::Sink;
+use super::{Rig, SessionError};
+use crate::link::{LinkEvent, Sink};
 use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -140,6 +140,33 @@ impl PlayedScenario {
             outcome: Outcome::skipped(skip),
             attempts: Vec::new(),
         }
+    }
+
+    /// Plays attempts on a rig in use, into what keeps them, while there are more.
+    ///
+    /// # Errors
+    /// That of an attempt.
+    pub fn play<R>(
+        run: &mut R,
+        mut keeper: Option<&mut dyn Keeper>,
+        attempt: impl Fn(&mut R, &mut dyn Sink) -> Result<Attempt, SessionError>,
+        more: impl Fn(&mut R, &[Attempt]) -> bool,
+    ) -> Result<Self, SessionError> {
+        let mut attempts = Vec::new();
+        while attempts.is_empty() || more(run, &attempts) {
+            let number = attempts.len() + 1;
+            let attempt = match &mut keeper {
+                Some(keeper) => {
+                    keeper.begins(number);
+                    let attempt = attempt(run, &mut **keeper)?;
+                    keeper.ends(number, &attempt);
+                    attempt
+                }
+                None => attempt(run, &mut Vec::<LinkEvent>::new())?,
+            };
+            attempts.push(attempt);
+        }
+        Ok(Self::of(attempts))
     }
 
     /// The last attempt that was played speaks for all; one whose bytes are right is flaky where another one failed. Where none was

@@ -157,7 +157,7 @@ impl<'s> Run<'s> {
     pub(crate) fn play(
         &mut self,
         plan: &Plan,
-        mut keeper: Option<&mut dyn Keeper>,
+        keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError> {
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let way = self.way();
@@ -167,29 +167,13 @@ impl<'s> Run<'s> {
             return Ok(PlayedScenario::skipped(skip));
         }
         self.remember(plan);
-        let mut attempts = Vec::new();
-        loop {
-            let number = attempts.len() + 1;
-            if let Some(keeper) = &mut keeper {
-                keeper.begins(number);
-            }
-            let sink = keeper.as_mut().map(|keeper| &mut **keeper as &mut dyn Sink);
-            let attempt = self.attempt(plan, sink)?;
-            if let Some(keeper) = &mut keeper {
-                keeper.ends(number, &attempt);
-            }
-            attempts.push(attempt);
-            if !self.again.after(&attempts) || self.session.link().trouble().is_some() {
-                return Ok(PlayedScenario::of(attempts));
-            }
-        }
+        let attempt = |run: &mut Self, sink: &mut dyn Sink| run.attempt(plan, sink);
+        PlayedScenario::play(self, keeper, attempt, |run, attempts| {
+            run.again.after(attempts) && run.session.link().trouble().is_none()
+        })
     }
 
-    fn attempt(
-        &mut self,
-        plan: &Plan,
-        sink: Option<&mut dyn Sink>,
-    ) -> Result<Attempt, SessionError> {
+    fn attempt(&mut self, plan: &Plan, sink: &mut dyn Sink) -> Result<Attempt, SessionError> {
         let mut plan = plan.clone();
         plan.master = self.master.or(plan.master);
         let plan = &plan;
@@ -584,15 +568,13 @@ impl Sink for LifeSign {
 /// Keeps events and hands them on.
 struct KeepingSink<'s> {
     events: Vec<LinkEvent>,
-    sink: Option<&'s mut dyn Sink>,
+    sink: &'s mut dyn Sink,
 }
 
 impl Sink for KeepingSink<'_> {
     fn take(&mut self, event: &LinkEvent) {
         self.events.push(event.clone());
-        if let Some(sink) = &mut self.sink {
-            sink.take(event);
-        }
+        self.sink.take(event);
     }
 }
 

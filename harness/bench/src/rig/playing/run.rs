@@ -270,7 +270,7 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
     fn play(
         &mut self,
         source: &Source,
-        mut keeper: Option<&mut dyn Keeper>,
+        keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError> {
         let scenario = match read::<P>(source) {
             Ok(scenario) => Arc::new(scenario),
@@ -279,25 +279,11 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
         if let Some(skip) = self.player.not_begun(&scenario) {
             return Ok(PlayedScenario::skipped(skip.on_port()));
         }
-        let mut attempts = Vec::new();
-        loop {
-            let number = attempts.len() + 1;
-            let mut forgotten: Vec<LinkEvent> = Vec::new();
-            let attempt = match &mut keeper {
-                Some(keeper) => {
-                    keeper.begins(number);
-                    let attempt = self.attempt(&scenario, &mut **keeper);
-                    keeper.ends(number, &attempt);
-                    attempt
-                }
-                None => self.attempt(&scenario, &mut forgotten),
-            };
-            attempts.push(attempt);
-            let more = self.again.after(&attempts);
-            if !more || self.over.is_some() || self.session.link().trouble().is_some() {
-                return Ok(PlayedScenario::of(attempts));
-            }
-        }
+        let attempt = |run: &mut Self, sink: &mut dyn Sink| Ok(run.attempt(&scenario, sink));
+        PlayedScenario::play(self, keeper, attempt, |run, attempts| {
+            let more = run.again.after(attempts) && run.over.is_none();
+            more && run.session.link().trouble().is_none()
+        })
     }
 
     fn qualify(
