@@ -14,15 +14,15 @@ use crate::qualify::{
 };
 use crate::rig::sim::RigOfRings as _;
 use crate::twin::{Conversation, Exactness, Twin};
-use harness_bench::link::{Capability, Line as _, LinkEvent, Replay, Trouble};
+use harness_bench::bus_name::BusName;
+use harness_bench::link::{Capability, LinkEvent, Replay, Trouble};
 use harness_bench::rig::playing::{
     QualificationRecord, Qualified, QualifyingScenario, RecordJudge, RecordedAttempt,
-    RecordedBench, RepeatedVerdict,
+    RecordedBench, RepeatedVerdict, of_bus,
 };
 use harness_bench::rig::rings::rings;
 use harness_bench::rig::{Attempt, Rig};
-use harness_bench::scenario::parse;
-use harness_bench::scenario::run::{DENIED, Outcome, Skip, Why};
+use harness_bench::scenario::run::{DENIED, Outcome, Why};
 use harness_bench::scenario::source::Source;
 use harness_proto::line::Rate;
 use harness_proto::novobus::guard::Limits;
@@ -131,9 +131,9 @@ impl RecordJudge for RingJudge {
     }
 
     fn not_begun(&self, source: &Source, remarks: &[String]) -> Option<Outcome> {
-        let bus = parse::bus(source);
-        let Ok(entry) = self.scenario(source) else {
-            return Some(Outcome::skipped(Skip::not_on_rig(bus)));
+        let entry = match of_bus(BusName::Novobus, source, |source| self.scenario(source)) {
+            Ok(entry) => entry,
+            Err(skip) => return Some(Outcome::skipped(skip)),
         };
         let link = self.replay(&[]).keeping_parity(keeping_parity(&self.rig));
         // What the guard knew of the drives is not in the record.
@@ -253,13 +253,7 @@ impl RecordJudge for RingJudge {
         if !self.qualifies {
             (attempt.master_is_right, attempt.own) = (true, None);
         }
-        Ok(RepeatedVerdict {
-            attempt,
-            left: replay.left(),
-            played: None,
-            trouble: replay.trouble().is_some(),
-            exact,
-        })
+        Ok(RepeatedVerdict::of(attempt, &replay, exact))
     }
 }
 

@@ -11,12 +11,10 @@ use harness_bench::bus_name::BusName;
 use harness_bench::counted::counted;
 use harness_bench::link::{Line as _, Octets as _, Trouble};
 use harness_bench::rig::playing::{
-    QualificationKeeper, QualificationStopped, Qualified, RecordedBench, RigRun,
+    QualificationKeeper, QualificationStopped, Qualified, RecordedBench, RigRun, of_bus,
 };
 use harness_bench::rig::{End, Keeper, PlayedScenario, Rig, SessionError, UseOptions};
-use harness_bench::scenario::parse;
 use harness_bench::scenario::problem::Problems;
-use harness_bench::scenario::run::Skip;
 use harness_bench::scenario::source::Source;
 use harness_proto::line::Rate;
 
@@ -81,15 +79,11 @@ impl RigRun for RingRun {
         source: &Source,
         keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError> {
-        let bus = parse::bus(source);
-        if bus != BusName::Novobus {
-            return Ok(PlayedScenario::skipped(Skip::not_on_rig(bus)));
-        }
         let drives = self.run.session().rig().ring_size();
-        match RingScenario::fitting(source.clone(), Some(drives)) {
+        let read = |source: &Source| RingScenario::fitting(source.clone(), Some(drives));
+        match of_bus(BusName::Novobus, source, read) {
             Ok(entry) => self.run.play(&entry.plan, keeper),
-            // It was read when it was selected.
-            Err(_) => Ok(PlayedScenario::skipped(Skip::not_on_rig(bus))),
+            Err(skip) => Ok(PlayedScenario::skipped(skip)),
         }
     }
 
@@ -110,10 +104,6 @@ impl RigRun for RingRun {
         let began = keeper.began();
         let mut bench = BenchInUse { ring: self, keeper };
         qualification.settle(&mut bench, began, thorough)
-    }
-
-    fn notes(&mut self) -> Vec<String> {
-        Vec::new()
     }
 
     fn over(&mut self) -> Option<String> {

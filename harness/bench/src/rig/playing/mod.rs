@@ -4,8 +4,10 @@ pub mod observed;
 pub mod run;
 
 use super::{Attempt, End, Keeper, PlayedScenario, Rig, SessionError};
-use crate::link::{Capability, LinkEvent, Trouble};
-use crate::scenario::run::Outcome;
+use crate::bus_name::BusName;
+use crate::link::{Capability, Line as _, LinkEvent, Replay, Trouble};
+use crate::scenario::parse;
+use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -59,6 +61,20 @@ impl RecordedBench {
             anew: false,
         }
     }
+}
+
+/// A scenario of this bus, which `read` reads, or why a rig of the bus does not play it.
+///
+/// # Errors
+/// It is of another bus. A scenario with mistakes is refused where it is selected.
+pub fn of_bus<S, E>(
+    bus: BusName,
+    source: &Source,
+    read: impl FnOnce(&Source) -> Result<S, E>,
+) -> Result<S, Skip> {
+    let named = parse::bus(source);
+    let scenario = (named == bus).then(|| read(source).ok()).flatten();
+    scenario.ok_or_else(|| Skip::not_on_rig(named))
 }
 
 /// What a qualification comes to.
@@ -161,7 +177,9 @@ pub trait RigRun {
     ) -> Result<Qualified, QualificationStopped>;
 
     /// Notes about the drives since the last call, in sentences.
-    fn notes(&mut self) -> Vec<String>;
+    fn notes(&mut self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Why nothing more is played, in a sentence; `None` if the next scenario can be.
     fn over(&mut self) -> Option<String>;
@@ -207,6 +225,19 @@ pub struct RepeatedVerdict {
     pub trouble: bool,
     /// Whether the outcome must be the same to the last remark and moment.
     pub exact: bool,
+}
+
+impl RepeatedVerdict {
+    /// Of an attempt that was played on its record.
+    pub fn of(attempt: Attempt, record: &Replay, exact: bool) -> Self {
+        Self {
+            attempt,
+            left: record.left(),
+            played: None,
+            trouble: record.trouble().is_some(),
+            exact,
+        }
+    }
 }
 
 /// A scenario that a qualification plays after the selected ones.

@@ -3,7 +3,7 @@
 use super::observed::Beats;
 use super::{
     QualificationKeeper, QualificationRecord, QualificationStopped, Qualified, QualifyingScenario,
-    RecordJudge, RecordedAttempt, RecordedBench, RepeatedVerdict, RigRun,
+    RecordJudge, RecordedAttempt, RecordedBench, RepeatedVerdict, RigRun, of_bus,
 };
 use crate::bus_name::BusName;
 use crate::guard::Safe;
@@ -11,7 +11,6 @@ use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
 use crate::rig::session::{RigDrives, RigSession, failed};
 use crate::rig::{Attempt, End, Keeper, PlayedScenario, RetryRule, Rig, SessionError, UseOptions};
-use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
@@ -272,7 +271,7 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
         source: &Source,
         keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError> {
-        let scenario = match read::<P>(source) {
+        let scenario = match of_bus(P::BUS, source, P::read) {
             Ok(scenario) => Arc::new(scenario),
             Err(skip) => return Ok(PlayedScenario::skipped(skip)),
         };
@@ -410,16 +409,11 @@ impl<P: PortPlayer> PortJudge<P> {
         let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
         let mut replay = self.player.replay(events, tolerance);
         let (outcome, before) = self.player.attempt(scenario, &mut replay);
-        Ok(RepeatedVerdict {
-            attempt: Attempt {
-                opening: Some(before),
-                ..Attempt::new(outcome, Vec::new())
-            },
-            left: replay.left(),
-            played: None,
-            trouble: replay.trouble().is_some(),
-            exact: true,
-        })
+        let attempt = Attempt {
+            opening: Some(before),
+            ..Attempt::new(outcome, Vec::new())
+        };
+        Ok(RepeatedVerdict::of(attempt, &replay, true))
     }
 }
 
@@ -440,7 +434,7 @@ impl<P: PortPlayer> RecordJudge for PortJudge<P> {
     }
 
     fn not_begun(&self, source: &Source, _remarks: &[String]) -> Option<Outcome> {
-        let skip = match read::<P>(source) {
+        let skip = match of_bus(P::BUS, source, P::read) {
             Err(skip) => Some(skip),
             Ok(scenario) => self.player.not_begun(&scenario),
         };
@@ -497,13 +491,4 @@ impl<P: PortPlayer> RecordJudge for PortJudge<P> {
 fn retries<P: PortPlayer>(rig: &Rig, options: &UseOptions) -> RetryRule {
     let segment = P::segment(rig, options.allow_motion);
     RetryRule::of(rig, segment.tolerance, options.ill_as_well)
-}
-
-/// A scenario of this bus, or why it is not played here.
-fn read<P: PortPlayer>(source: &Source) -> Result<P::Own, Skip> {
-    match parse::bus(source) {
-        // It was read when it was selected.
-        bus if bus == P::BUS => P::read(source).map_err(|_| Skip::not_on_rig(P::BUS)),
-        other => Err(Skip::not_on_rig(other)),
-    }
 }
