@@ -104,6 +104,16 @@ impl Rig {
         started.checked_add(longest.0)
     }
 
+    /// The same rig for a run that is played again from its record: it touches nothing outside the program.
+    #[must_use]
+    pub fn for_replay(&self) -> Self {
+        let mut rig = self.clone();
+        rig.file.hooks = Default::default();
+        rig.file.power.clear();
+        rig.file.quarantine = None;
+        rig
+    }
+
     /// Whether its drives are simulated in the program. Such a rig needs no lock: everyone has a copy.
     #[must_use]
     pub fn is_simulated(&self) -> bool {

@@ -24,18 +24,13 @@ pub(super) fn rerun(
     if !header.simulated || header.schema < 2 || one_by_one {
         return Vec::new();
     }
-    let mut rig = opened.rig.clone();
-    // Nothing outside the folder is touched.
-    rig.file.hooks = Default::default();
-    rig.file.power.clear();
-    rig.file.quarantine = None;
     let options = UseOptions {
         purpose: "verify".to_owned(),
         allow_motion: true,
         ill_as_well: header.qualified,
         ..UseOptions::default()
     };
-    let mut run = match run_on(&rig, &options) {
+    let mut run = match run_on(&opened.rig.for_replay(), &options) {
         Ok(run) => run,
         Err(error) => return vec![format!("the run cannot be played again: {error}")],
     };

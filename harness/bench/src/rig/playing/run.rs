@@ -373,12 +373,8 @@ impl<P: PortPlayer> PortJudge<P> {
                     ill_as_well: self.qualifies,
                     ..UseOptions::default()
                 };
-                // Nothing outside the folder is touched.
-                let mut rig = self.rig.clone();
-                rig.file.hooks = Default::default();
-                rig.file.power.clear();
-                rig.file.quarantine = None;
-                PortRun::open(&rig, &options).map_err(|error| error.to_string())?
+                PortRun::open(&self.rig.for_replay(), &options)
+                    .map_err(|error| error.to_string())?
             }
         };
         let mut events: Vec<LinkEvent> = Vec::new();
