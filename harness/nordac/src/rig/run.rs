@@ -25,7 +25,7 @@ impl PortPlayer for Player {
     const BUS: BusName = BusName::Nordac;
     const ANEW: bool = true;
     type Drives = Inverters;
-    type Own = RigScenario;
+    type Scenario = RigScenario;
 
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let port = rig.port();

@@ -35,7 +35,7 @@ impl PortPlayer for Player {
     const BUS: BusName = BusName::Unitek;
     const ANEW: bool = false;
     type Drives = UnitekDrives;
-    type Own = RigScenario;
+    type Scenario = RigScenario;
 
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let port = rig.port();

@@ -30,7 +30,7 @@ pub trait PortPlayer: Sized {
     type Drives: RigDrives;
 
     /// A scenario, read for a rig.
-    type Own;
+    type Scenario;
 
     /// For a run in which motors may turn, as far as the rig's file permits it, or for one in which they may not; of a qualification or not.
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self;
@@ -48,13 +48,13 @@ pub trait PortPlayer: Sized {
     ///
     /// # Errors
     /// Its mistakes.
-    fn read(source: &Source) -> Result<Self::Own, Box<Problems>>;
+    fn read(source: &Source) -> Result<Self::Scenario, Box<Problems>>;
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
-    fn not_begun(&self, scenario: &Self::Own) -> Option<Skip>;
+    fn not_begun(&self, scenario: &Self::Scenario) -> Option<Skip>;
 
     /// Whether a scenario does something to the drives beside the bus.
-    fn disturbs(_own: &Self::Own) -> bool {
+    fn disturbs(_scenario: &Self::Scenario) -> bool {
         false
     }
 
@@ -67,18 +67,19 @@ pub trait PortPlayer: Sized {
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay;
 
     /// Waits until an attempt may begin.
-    fn wait(&mut self, _own: &Self::Own, _link: &mut dyn Link) {}
+    fn wait(&mut self, _scenario: &Self::Scenario, _link: &mut dyn Link) {}
 
     /// Something was lost in the last attempt: what probes have settled by a silence in it is not known.
     fn doubt(&mut self) {}
 
     /// One attempt over a link, with what was received before the scenario, in words.
-    fn attempt(&mut self, scenario: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
+    fn attempt(&mut self, scenario: &Arc<Self::Scenario>, link: &mut dyn Link)
+    -> (Outcome, String);
 
     /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
     fn set_back(
         &mut self,
-        scenario: &Self::Own,
+        scenario: &Self::Scenario,
         session: &mut RigSession<Self::Drives>,
     ) -> Vec<String>;
 
@@ -100,7 +101,7 @@ pub struct PortRun<P: PortPlayer> {
     /// Why nothing more is played.
     over: Option<String>,
     /// A scenario behind which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
-    unfinished: Option<Arc<P::Own>>,
+    unfinished: Option<Arc<P::Scenario>>,
     /// How simulated drives that were restarted since were not brought to their safe state.
     not_safe: Option<Safe>,
 }
@@ -146,7 +147,7 @@ impl<P: PortPlayer> PortRun<P> {
     }
 
     /// Sets back what a scenario has changed.
-    fn set_back(&mut self, scenario: &P::Own) {
+    fn set_back(&mut self, scenario: &P::Scenario) {
         let player = &mut self.player;
         let set_back = |session: &mut _| player.set_back(scenario, session);
         let notes = self.session.without_deadline(set_back);
@@ -191,7 +192,7 @@ impl<P: PortPlayer> PortRun<P> {
         }
     }
 
-    fn attempt(&mut self, scenario: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
+    fn attempt(&mut self, scenario: &Arc<P::Scenario>, sink: &mut dyn Sink) -> Attempt {
         let anew = P::ANEW && self.session.rig().is_simulated();
         if anew {
             self.restart();
@@ -364,7 +365,7 @@ impl<P: PortPlayer> PortJudge<P> {
     }
 
     /// Plays an attempt on the simulated rig again, behind those before it.
-    fn again(&mut self, scenario: &Arc<P::Own>) -> Result<RepeatedVerdict, String> {
+    fn again(&mut self, scenario: &Arc<P::Scenario>) -> Result<RepeatedVerdict, String> {
         let mut run = match self.run.take() {
             Some(run) => run,
             None => {
@@ -396,7 +397,7 @@ impl<P: PortPlayer> PortJudge<P> {
 
     fn repeated(
         &mut self,
-        scenario: &Arc<P::Own>,
+        scenario: &Arc<P::Scenario>,
         events: &[LinkEvent],
     ) -> Result<RepeatedVerdict, String> {
         if self.rig.is_simulated() {
