@@ -21,7 +21,7 @@ struct ChangedNotes {
     stops: Option<Pieces>,
 }
 
-/// Sentences with the commands that put it back. They stand in the file `ID.left` beside the rig's lock too, for the next run behind one that
+/// Sentences with the commands that put it back. They stand in the file `ID.left` beside the rig's lock too, for the next run after one that
 /// was killed.
 #[derive(Clone, Debug, Default)]
 pub struct NotPutBack {

@@ -413,7 +413,7 @@ mod tests {
         assert!(more(&[late("a", 40), attempt(Failed, "")]));
     }
 
-    /// ND21 9.9: drives that monitor time-outs change their bytes behind a silence of the computer.
+    /// ND21 9.9: drives that monitor time-outs change their bytes after a silence of the computer.
     #[test]
     fn a_late_computer_takes_no_attempt_from_what_fails() {
         let late = || {

@@ -296,7 +296,7 @@ impl<D: RigDrives> RigSession<D> {
         self.link.unwatched(|link| drives.safe_state(link, &wanted))
     }
 
-    /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.
+    /// Makes the link of use again after a signal: for the safe state, and what is set back after it.
     pub fn resume(&mut self) {
         self.link.clear_the_way();
         self.go_on();

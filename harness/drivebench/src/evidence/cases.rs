@@ -204,7 +204,7 @@ impl RecordedVerdict {
 }
 
 impl JudgedAttempt<'_> {
-    /// Whether the rig's line was lost in it, or the like: nothing is played behind it.
+    /// Whether the rig's line was lost in it, or the like: nothing is played after it.
     pub(super) fn ends_the_run(&self) -> bool {
         let mut events = self.recorded.events.iter();
         events.any(|event| matches!(event, LinkEvent::Trouble(trouble) if trouble.ends_a_run()))

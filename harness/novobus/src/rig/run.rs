@@ -491,7 +491,7 @@ pub(crate) fn play_one(
     Ok(play_examined(link, plan, way))
 }
 
-/// The same behind the examination.
+/// The same after the examination.
 fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
     let ready = match way.anew {
         true => start_anew(link, &way.rings),
@@ -526,7 +526,7 @@ fn ends_in_silence(outcome: &Outcome) -> bool {
     outcome.verdict == Verdict::Failed && finding.is_some_and(silent)
 }
 
-/// Drops the bytes that come back behind the end of a conversation, from rings that owe some.
+/// Drops the bytes that come back after the end of a conversation, from rings that owe some.
 fn drop_late(link: &mut dyn Link, rings: &[RingSize], last: &Conversation) {
     let owed = |(ring, size): (usize, &RingSize)| {
         let answered = answered(*size, &last.sent_in(ring)).0.len();

@@ -95,7 +95,7 @@ pub type Play<'p> = dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario,
 #[derive(Clone, Copy, Debug)]
 pub struct QualificationStopped;
 
-/// What keeps and shows the scenarios that a qualification plays behind the selected ones.
+/// What keeps and shows the scenarios that a qualification plays after the selected ones.
 pub trait QualificationKeeper {
     /// When it began, as a date and time of day in UTC.
     fn began(&self) -> String;
@@ -166,7 +166,7 @@ pub trait RigRun {
     /// Takes note of a selected scenario of a qualification, by its name in the folder of evidence.
     fn note(&mut self, _name: &str, _played: &PlayedScenario) {}
 
-    /// Plays what a qualification plays behind the selected scenarios; with `thorough` the long conversations too. Returns what all comes to.
+    /// Plays what a qualification plays after the selected scenarios; with `thorough` the long conversations too. Returns what all comes to.
     ///
     /// # Errors
     /// [`QualificationStopped`].
@@ -217,7 +217,7 @@ pub struct RecordedAttempt<'r> {
 #[derive(Clone, Debug)]
 pub struct RepeatedVerdict {
     pub attempt: Attempt,
-    /// What the record holds behind the end of the attempt.
+    /// What the record holds after the end of the attempt.
     pub left: Option<String>,
     /// Of simulated drives, for which the attempt was played again: what happened, and what the bus carried.
     pub played: Option<(Vec<LinkEvent>, Vec<Trace>)>,
@@ -266,7 +266,7 @@ pub struct RecordedPart {
     pub name: String,
     /// The selected scenarios, with their places in the list of all.
     pub selected: Vec<(usize, RecordedCase)>,
-    /// What it has played behind them.
+    /// What it has played after them.
     pub cases: VecDeque<RecordedCase>,
     /// Whether it was played to its end.
     pub whole: bool,
@@ -288,7 +288,7 @@ pub enum QualificationRecord<'r> {
     },
 }
 
-/// Judges the attempts of a record again, in their order: what one of them found out about the drives counts for those behind it.
+/// Judges the attempts of a record again, in their order: what one of them found out about the drives counts for those after it.
 pub trait RecordJudge {
     /// Takes the capabilities in the first line of a record, and returns what that line must say. They tell whether motors could turn.
     fn adopt(&mut self, capabilities: &[String]) -> RecordedBench;
@@ -301,7 +301,7 @@ pub trait RecordJudge {
     /// Why a scenario is not begun on this rig; `None` if it is. The record gives these remarks for it.
     fn not_begun(&self, source: &Source, remarks: &[String]) -> Option<Outcome>;
 
-    /// The scenarios that a qualification plays behind the selected ones.
+    /// The scenarios that a qualification plays after the selected ones.
     fn conversations(&self) -> Vec<QualifyingScenario>;
 
     /// Whether a qualification makes scenarios of such a name from what it has heard.
@@ -309,7 +309,7 @@ pub trait RecordJudge {
         false
     }
 
-    /// The attempts behind are those of another part of a qualification: nothing is known of its drives.
+    /// The next attempts are those of another part of a qualification: nothing is known of its drives.
     fn begin_part(&mut self);
 
     /// What a qualification comes to that began at this date and time of day in UTC: each outcome that its record allows, none if the record

@@ -83,7 +83,7 @@ pub trait PortPlayer: Sized {
         session: &mut RigSession<Self::Drives>,
     ) -> Vec<String>;
 
-    /// The scenarios that a qualification plays behind the selected ones.
+    /// The scenarios that a qualification plays after the selected ones.
     fn conversations(rig: &Rig) -> Vec<Source>;
 
     /// What the attempts of these players come to, one for each part of a qualification that began at this date and time of day in UTC;
@@ -100,7 +100,7 @@ pub struct PortRun<P: PortPlayer> {
     notes: Vec<String>,
     /// Why nothing more is played.
     over: Option<String>,
-    /// A scenario behind which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
+    /// A scenario after which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
     unfinished: Option<Arc<P::Scenario>>,
     /// How simulated drives that were restarted since were not brought to their safe state.
     not_safe: Option<Safe>,
@@ -155,7 +155,7 @@ impl<P: PortPlayer> PortRun<P> {
         self.notes.extend(notes);
     }
 
-    /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed.
+    /// Takes the drives to their safe state after a scenario that was broken off, and sets back what it has changed.
     ///
     /// # Errors
     /// The safe state is not confirmed.
@@ -332,7 +332,7 @@ impl<P: PortPlayer> RigRun for PortRun<P> {
         }
         let notes = self.notes();
         let mut end = self.session.close(error);
-        // Simulated drives are taken to their safe state behind scenarios alone.
+        // Simulated drives are taken to their safe state after scenarios only.
         end.safe = end.safe.or(not_safe);
         end.remarks.extend(notes);
         end
@@ -364,7 +364,7 @@ impl<P: PortPlayer> PortJudge<P> {
         }
     }
 
-    /// Plays an attempt on the simulated rig again, behind those before it.
+    /// Plays an attempt on the simulated rig again, after those before it.
     fn again(&mut self, scenario: &Arc<P::Scenario>) -> Result<RepeatedVerdict, String> {
         let mut run = match self.run.take() {
             Some(run) => run,
