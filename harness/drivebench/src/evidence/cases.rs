@@ -32,12 +32,14 @@ pub(super) fn differences(
     };
     let mut left = judged;
     let mut pending = 0;
-    for line in &opened.lines {
+    let is_case = |line: &RecordLine| matches!(line, RecordLine::Case { .. });
+    let last = opened.lines.iter().rposition(is_case);
+    for (place, line) in opened.lines.iter().enumerate() {
         match line {
             RecordLine::Scenario { .. } => pending += 1,
             RecordLine::Case { .. } => {
                 let (attempts, rest) = left.split_at(pending.min(left.len()));
-                settling.case(line, attempts);
+                settling.case(line, attempts, Some(place) == last);
                 (left, pending) = (rest, 0);
             }
             RecordLine::End { verdicts, safe } => settling.end(verdicts, *safe, &left[..pending]),
@@ -56,7 +58,7 @@ struct Settling<'s> {
 }
 
 impl Settling<'_> {
-    fn case(&mut self, line: &RecordLine, attempts: &[JudgedAttempt<'_>]) {
+    fn case(&mut self, line: &RecordLine, attempts: &[JudgedAttempt<'_>], is_last: bool) {
         let RecordLine::Case {
             name,
             title,
@@ -123,11 +125,12 @@ impl Settling<'_> {
             &Span::from_units(*took).units().to_string(),
             &outcome.took.units().to_string(),
         );
-        self.numbers(name, attempts);
+        self.numbers(name, attempts, is_last);
     }
 
-    /// Attempts are counted from 1, and there are as many as the rig's file asks for.
-    fn numbers(&mut self, name: &str, attempts: &[JudgedAttempt<'_>]) {
+    /// Attempts are counted from 1, and there are as many as the rig's file asks for. A run on a rig with ports ends after an attempt whose
+    /// drives are not seen in their safe state, which no record shows.
+    fn numbers(&mut self, name: &str, attempts: &[JudgedAttempt<'_>], is_last: bool) {
         let header = &self.opened.header;
         let numbers = attempts.iter().map(|attempt| attempt.recorded.attempt);
         if !numbers.eq(1..=attempts.len()) {
@@ -143,7 +146,8 @@ impl Settling<'_> {
             Ok((_, again)) => again.trouble,
             Err(_) => true,
         });
-        let too_few = self.retries.after(&all) && !trouble;
+        let may_end = trouble || is_last && !header.simulated;
+        let too_few = self.retries.after(&all) && !may_end;
         if too_many || too_few {
             let count = attempts.len();
             self.wrong.push(format!(

@@ -368,7 +368,7 @@ impl OpenedFolder {
                 "the clock of the computer: times fit the rate of the line and each other, but could be others by as much",
             );
             all.push(
-                "which faults on links never happened, line errors without their bytes, bytes on inner links, whether a port had more to send, why one was lost, and the safe state",
+                "which faults on links never happened, line errors without their bytes, bytes on inner links, whether a port had more to send, why one was lost, and the safe state, without which a run ends with the attempt that it has played",
             );
         }
         if header.qualified && !header.simulated || self.skips(|why| why.starts_with(DENIED)) {

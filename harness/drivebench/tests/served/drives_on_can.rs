@@ -444,3 +444,15 @@ fn drives_behind_an_adapter_are_explored() {
         "unconfirmed",
     );
 }
+
+/// A run ends after an attempt whose drives are not seen in their safe state: that no further attempt follows is nothing wrong with its evidence.
+#[test]
+fn evidence_of_a_run_that_ended_without_a_safe_state() {
+    let limits = format!("{MOTION}[retry]\nattempts = 3\n");
+    let desk = Desk::of("slcan", &limits, "drive 1 deviates no-lock\ndrive 2\n");
+    let line = "run unitek-ex-2-lock-stops --rig desk.toml --allow-motion --evidence kept";
+    let output = desk.command(line).output().expect("the program");
+    ended(&output, 7, "the safe state is NOT confirmed");
+    let verify = desk.command("verify kept").output().expect("the program");
+    ended(&verify, 0, "1 attempt judged again, 0 things wrong");
+}
