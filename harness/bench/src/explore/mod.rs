@@ -19,7 +19,6 @@ pub mod planted;
 pub mod pool;
 pub mod promote;
 pub mod record;
-pub mod search;
 pub mod smaller;
 pub mod swarm;
 pub mod target;

@@ -6,6 +6,7 @@
 use super::known::{KnownInverters, candidates};
 use super::observed::{Agreement, WHOLE};
 use super::talk::{Talk, TalkError};
+use harness_bench::qualify::search::{JudgedValues, SearchOutcome, SearchWay, explain};
 use harness_proto::nordac::properties::{Description, Properties};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{IDENT, Image, Pkw};
@@ -53,8 +54,12 @@ const TASKS: [Pkw; 13] = [
 /// The fault memory (4.1.3, 5.7).
 const FAULT_MEMORY: [u16; 3] = [947, 1801, 1806];
 
-/// In how many points a slave may differ from the default at once.
-const MOST_DIFFERENCES: usize = 12;
+/// In how many points a slave may differ from the default at once, and that all best explanations count.
+const WAY: SearchWay = SearchWay {
+    most_changed: 12,
+    followed: 1,
+    all: true,
+};
 
 /// How many exchanges a task is given: its answer comes with the third (`pkw-latency`).
 const ANSWERED: usize = 6;
@@ -134,71 +139,31 @@ pub(super) fn search(
     may: impl Fn(usize, &Description) -> bool,
     mut explains: impl FnMut(&Assumptions) -> Agreement,
 ) -> Vec<(String, Assumptions)> {
-    let mut so_far = (explains(base), base.clone());
-    if so_far.0 == WHOLE {
-        return vec![(String::new(), base.clone())];
+    let agreement = |(_, slaves): &_| Some(explains(slaves)).filter(|agreed| *agreed != WHOLE);
+    let neighbours = |(_, slaves): &(String, Assumptions)| steps(slaves, &may);
+    let pairs = |so_far, one: &[JudgedValues<(String, Assumptions), Agreement>]| {
+        // Two points that each show nothing up to the first difference do not explain it.
+        let seen = one.iter().filter(|(agreed, _)| *agreed != Some(so_far));
+        let seen: BTreeSet<_> = seen.map(|(_, (words, _))| name_of(words)).collect();
+        one.iter()
+            .filter(|(_, (words, _))| seen.contains(name_of(words)))
+            .flat_map(|(_, (words, slaves))| {
+                // Each pair in one order, and no property twice.
+                let later = |place: usize, property: &Description| {
+                    let name = name_of(words);
+                    let done = seen.contains(property.name) && property.name <= name;
+                    property.name != name && !done && may(place, property)
+                };
+                let both = move |(second, slaves)| (format!("{words}, {second}"), slaves);
+                steps(slaves, later).into_iter().map(both)
+            })
+            .collect()
+    };
+    let begin = (String::new(), base.clone());
+    match explain([begin], WAY, agreement, neighbours, pairs) {
+        SearchOutcome::By(found) => found,
+        SearchOutcome::Not(_) | SearchOutcome::Undecided => Vec::new(),
     }
-    for _ in 0..MOST_DIFFERENCES {
-        let one = judged(steps(&so_far.1, &may), &mut explains);
-        let mut found = best(so_far.0, &one);
-        if found.is_empty() {
-            // Two points that each show nothing up to the first difference do not explain it.
-            let seen = one.iter().filter(|step| step.agreed != so_far.0);
-            let seen: BTreeSet<_> = seen.map(|step| name_of(&step.words)).collect();
-            let two = one
-                .iter()
-                .filter(|step| seen.contains(name_of(&step.words)))
-                .flat_map(|first| {
-                    // Each pair in one order, and no property twice.
-                    let later = |place: usize, property: &Description| {
-                        let name = name_of(&first.words);
-                        let done = seen.contains(property.name) && property.name <= name;
-                        property.name != name && !done && may(place, property)
-                    };
-                    let both = |(second, slaves)| (format!("{}, {second}", first.words), slaves);
-                    steps(&first.slaves, later).into_iter().map(both)
-                })
-                .collect();
-            found = best(so_far.0, &judged(two, &mut explains));
-        }
-        match found.first() {
-            None => return Vec::new(),
-            Some(step) if step.agreed == WHOLE => {
-                let all = found.into_iter();
-                return all.map(|step| (step.words, step.slaves)).collect();
-            }
-            Some(step) => so_far = (step.agreed, step.slaves.clone()),
-        }
-    }
-    Vec::new()
-}
-
-/// Slaves, how they differ from others, and how far they do what was seen.
-#[derive(Clone)]
-struct Step {
-    agreed: Agreement,
-    words: String,
-    slaves: Assumptions,
-}
-
-fn judged(
-    all: Vec<(String, Assumptions)>,
-    explains: &mut impl FnMut(&Assumptions) -> Agreement,
-) -> Vec<Step> {
-    let all = all.into_iter().map(|(words, slaves)| Step {
-        agreed: explains(&slaves),
-        words,
-        slaves,
-    });
-    all.collect()
-}
-
-/// The steps that explain most, equally much; none if that is no more than `so_far`.
-fn best(so_far: Agreement, all: &[Step]) -> Vec<Step> {
-    let most = all.iter().map(|step| step.agreed).max();
-    let most = most.filter(|most| *most > so_far);
-    let best = all.iter().filter(|step| Some(step.agreed) == most);
-    best.cloned().collect()
 }
 
 /// The property of the words of a difference.

@@ -1,13 +1,19 @@
 //! Whether drives do what their manual says, with any values of its open points.
 //!
 //! What the drives sent is compared with what the model sends. Where it differs, the model is played again with other values of the open
-//! points (`explore::search`). Only what no such model explains is a difference.
+//! points (`qualify::search`). Only what no such model explains is a difference.
 
 use super::{LineBus, LineTalk, Seen};
-use crate::explore::search::{ModelSpace, SearchOutcome, explain};
+use crate::qualify::search::{SearchOutcome, SearchWay, explain};
 
 /// How unlike a piece and none are.
 const UNLIKE: i64 = 1_000_000;
+
+const WAY: SearchWay = SearchWay {
+    most_changed: 8,
+    followed: 3,
+    all: false,
+};
 
 /// The outcome of a conversation.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,19 +57,37 @@ impl<B: LineBus> Oracle<B> {
 
     /// Judges what the drives under test have done in a conversation.
     pub(crate) fn judge(&mut self, talk: &LineTalk<B>, seen: &Seen<B>) -> Judgement<B::Difference> {
-        let played = TalkReplay {
-            under_test: &self.under_test,
-            talk,
-            seen,
+        let under_test = &self.under_test;
+        let play = |values: &Vec<_>| B::play(&B::model(under_test, values), talk);
+        // Pieces before the first difference, and how like this one is.
+        let agreement = |values: &Vec<_>| {
+            let expected = play(values);
+            let place = first::<B>(&expected, seen)?;
+            let unlike = match (expected.said.get(place), seen.said.get(place)) {
+                (Some(expected), Some(seen)) => B::unlike(expected, seen),
+                _ => UNLIKE,
+            };
+            Some((place, -unlike))
         };
-        let begins = std::iter::once(&self.last).chain(&self.begins);
-        match explain(&played, begins.cloned()) {
-            SearchOutcome::By(found) => {
-                self.last = found;
+        let neighbours = |values: &Vec<_>| {
+            let near = |place| B::neighbours(under_test, place, &values[place]).into_iter();
+            let changed = |place: usize| {
+                near(place).map(move |changed| {
+                    let mut next = values.clone();
+                    next[place] = changed;
+                    next
+                })
+            };
+            (0..values.len()).flat_map(changed).collect()
+        };
+        let begins = std::iter::once(&self.last).chain(&self.begins).cloned();
+        match explain(begins, WAY, agreement, neighbours, |_, _| Vec::new()) {
+            SearchOutcome::By(mut found) => {
+                self.last = found.swap_remove(0);
                 Judgement::Explained
             }
             SearchOutcome::Not(best) => {
-                let expected = played.expected(&best);
+                let expected = play(&best);
                 let under = B::lines(&self.under_test, &best);
                 let found = first::<B>(&expected, seen).and_then(|place| {
                     B::difference(&self.under_test, place, (&expected, seen), under)
@@ -74,47 +98,6 @@ impl<B: LineBus> Oracle<B> {
             }
             SearchOutcome::Undecided => Judgement::Undecided,
         }
-    }
-}
-
-/// A conversation that was played on the drives under test.
-struct TalkReplay<'p, B: LineBus> {
-    under_test: &'p B::Setup,
-    talk: &'p LineTalk<B>,
-    seen: &'p Seen<B>,
-}
-
-impl<B: LineBus> TalkReplay<'_, B> {
-    fn expected(&self, values: &[B::Properties]) -> Seen<B> {
-        B::play(&B::model(self.under_test, values), self.talk)
-    }
-}
-
-impl<B: LineBus> ModelSpace for TalkReplay<'_, B> {
-    type Assumed = Vec<B::Properties>;
-    /// Pieces before the first difference, and how like this one is.
-    type Agreement = (usize, i64);
-
-    fn agreement(&self, assumed: &Self::Assumed) -> Option<(usize, i64)> {
-        let expected = self.expected(assumed);
-        let place = first::<B>(&expected, self.seen)?;
-        let unlike = match (expected.said.get(place), self.seen.said.get(place)) {
-            (Some(expected), Some(seen)) => B::unlike(expected, seen),
-            _ => UNLIKE,
-        };
-        Some((place, -unlike))
-    }
-
-    fn neighbours(&self, assumed: &Self::Assumed) -> Vec<Self::Assumed> {
-        let mut all = Vec::new();
-        for (place, properties) in assumed.iter().enumerate() {
-            for changed in B::neighbours(self.under_test, place, properties) {
-                let mut next = assumed.clone();
-                next[place] = changed;
-                all.push(next);
-            }
-        }
-        all
     }
 }
 
