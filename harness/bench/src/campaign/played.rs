@@ -42,7 +42,7 @@ pub trait PlayedCase: Sized {
     fn json(&self) -> Value;
 
     /// The maps of a page, each with its heading: which classes there are where.
-    fn maps(played: &Played<Self>) -> Vec<(String, Html)>;
+    fn maps(played: &CampaignResult<Self>) -> Vec<(String, Html)>;
 
     /// Name, what was disturbed, and what happened.
     fn line(&self) -> String {
@@ -57,7 +57,7 @@ pub trait PlayedCase: Sized {
 
 /// A campaign that was played.
 #[derive(Clone, Debug)]
-pub struct Played<C> {
+pub struct CampaignResult<C> {
     pub name: String,
     /// What it shows, in a line.
     pub title: String,
@@ -78,7 +78,7 @@ pub struct Played<C> {
     pub outcomes: Vec<C>,
 }
 
-impl<C: PlayedCase> Played<C> {
+impl<C: PlayedCase> CampaignResult<C> {
     /// The class of a case.
     pub fn of(&self, outcome: &C) -> &'static OutcomeClass {
         &self.classes[outcome.class()]
@@ -138,7 +138,7 @@ impl<C: PlayedCase> Played<C> {
     }
 }
 
-impl<C: PlayedCase> PlayedCampaign for Played<C> {
+impl<C: PlayedCase> PlayedCampaign for CampaignResult<C> {
     fn name(&self) -> &str {
         &self.name
     }

@@ -12,7 +12,7 @@ use crate::language::read::RingScenario;
 use crate::language::syntax::{Setup, SetupKind};
 use crate::simulate::bench;
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::played::{Played, each_on_threads};
+use harness_bench::campaign::played::{CampaignResult, each_on_threads};
 use harness_bench::scenario::files::{LibraryError, sources};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::problem::{Problem, Problems};
@@ -67,7 +67,7 @@ pub(crate) struct Contradiction {
 }
 
 /// A campaign that has been played.
-pub(crate) type PlayedCampaign = Played<CaseOutcome>;
+pub(crate) type PlayedCampaign = CampaignResult<CaseOutcome>;
 
 impl Campaign {
     /// Reads a campaign and its scenario; `folder` is where a scenario's path is looked for first.

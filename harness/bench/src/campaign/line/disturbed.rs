@@ -2,7 +2,7 @@
 
 use super::{LineCase, LineOutcome};
 use crate::bus_name::BusName;
-use crate::campaign::played::{Played, each_on_threads};
+use crate::campaign::played::{CampaignResult, each_on_threads};
 use crate::campaign::{Campaign, CampaignError, CaseFailure, OutcomeClass, PlayedCampaign, names};
 use crate::file::values::Time;
 use harness_proto::time::{Instant, Span};
@@ -278,7 +278,7 @@ impl<L: DisturbedLine> LineCampaign<L> {
         &self,
         threads: usize,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Played<LineOutcome>, String> {
+    ) -> Result<CampaignResult<LineOutcome>, String> {
         let outcome = |case: &(LineCase, L::Fault)| {
             let (class, played) = self.play(case)?;
             Ok::<_, String>(LineOutcome {
@@ -290,7 +290,7 @@ impl<L: DisturbedLine> LineCampaign<L> {
                 troubles: played.troubles,
             })
         };
-        Ok(Played {
+        Ok(CampaignResult {
             name: self.name.trim_end_matches(".toml").to_owned(),
             title: self.file.title.clone(),
             scenario: None,

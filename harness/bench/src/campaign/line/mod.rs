@@ -12,7 +12,7 @@ pub use disturbed::{
     line_names,
 };
 
-use super::played::{Played, PlayedCase};
+use super::played::{CampaignResult, PlayedCase};
 use crate::html::Html;
 use serde_json::{Value, json};
 
@@ -76,7 +76,7 @@ impl PlayedCase for LineOutcome {
     }
 
     /// A row for each thing that was disturbed, a column a fault. Colours only repeat the letters.
-    fn maps(played: &Played<Self>) -> Vec<(String, Html)> {
+    fn maps(played: &CampaignResult<Self>) -> Vec<(String, Html)> {
         let Some(first) = played.outcomes.first() else {
             return Vec::new();
         };
