@@ -9,35 +9,35 @@ use harness_proto::nordac::words::{STW, State, WordBit, ZSW};
 use harness_proto::nordac::{PARAMETERS, Parameter, PpoType, Task};
 use harness_proto::profibus::Buffer;
 use harness_proto::profibus::dp::{DIAGNOSIS_BITS, Service};
-use harness_proto::profibus::fdl::{Function, Reason, Status};
+use harness_proto::profibus::fdl::{FcFunction, FcStatus, Malformed};
 use std::fmt::Display;
 
 /// The dissector, with a place for each table.
 const TEMPLATE: &str = include_str!("nordac.lua");
 
 /// Why bytes are no telegram, as the dissector calls it.
-const REASONS: [(&str, Reason); 10] = [
-    ("start", Reason::Start),
-    ("length", Reason::Length),
-    ("length_repeated", Reason::LengthRepeated),
-    ("start_repeated", Reason::StartRepeated),
-    ("source", Reason::Source),
-    ("control", Reason::Control),
-    ("sap", Reason::Sap),
-    ("sap_missing", Reason::SapMissing),
-    ("check_sum", Reason::CheckSum),
-    ("finish", Reason::End),
+const REASONS: [(&str, Malformed); 10] = [
+    ("start", Malformed::Start),
+    ("length", Malformed::Length),
+    ("length_repeated", Malformed::LengthRepeated),
+    ("start_repeated", Malformed::StartRepeated),
+    ("source", Malformed::Source),
+    ("control", Malformed::Control),
+    ("sap", Malformed::Sap),
+    ("sap_missing", Malformed::SapMissing),
+    ("check_sum", Malformed::CheckSum),
+    ("finish", Malformed::End),
 ];
 
 #[must_use]
 pub(crate) fn dissector() -> String {
     let tables = [
         ("SERVICES", rows(Service::ALL.iter().map(service))),
-        ("FUNCTIONS", rows(Function::ALL.iter().map(function))),
+        ("FUNCTIONS", rows(FcFunction::ALL.iter().map(function))),
         (
             "STATUS",
             rows(
-                Status::ALL
+                FcStatus::ALL
                     .iter()
                     .map(|status| format!("[{}] = {:?}", status.code(), status.name())),
             ),
@@ -101,7 +101,7 @@ fn service(service: &Service) -> String {
     }
 }
 
-fn function(function: &Function) -> String {
+fn function(function: &FcFunction) -> String {
     let kind = match (function.is_srd(), function.is_sdn()) {
         (true, _) => "srd",
         (_, true) => "sdn",

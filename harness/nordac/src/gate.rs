@@ -4,7 +4,7 @@ use harness_bench::guard::{Denied, Gate, Guarded};
 use harness_bench::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use harness_bench::medium::{HeardPiece, Medium, Out};
 use harness_proto::limit::LimitSetting;
-use harness_proto::nordac::guard::{self, Denial, GuardedSlave, Limits, Missing};
+use harness_proto::nordac::guard::{self, FcsDenial, GuardedSlave, Limits, Missing};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use std::any::Any;
@@ -12,7 +12,7 @@ use std::any::Any;
 /// The gate of one port.
 #[derive(Clone, Debug)]
 pub(crate) struct LineGate {
-    gate: guard::Gate,
+    gate: guard::OctetGate,
     /// Nothing is sent.
     listen_only: bool,
 }
@@ -27,7 +27,7 @@ impl LineGate {
         listen_only: bool,
     ) -> Self {
         Self {
-            gate: guard::Gate::new(limits, rate, slaves),
+            gate: guard::OctetGate::new(limits, rate, slaves),
             listen_only,
         }
     }
@@ -50,18 +50,18 @@ impl LineGate {
     }
 
     /// The settings that deny something for this reason, as far as they are common to all buses.
-    fn denying(&self, denial: Denial) -> Vec<LimitSetting> {
+    fn denying(&self, denial: FcsDenial) -> Vec<LimitSetting> {
         let limits = self.gate.limits();
         let wanted: &[LimitSetting] = match denial {
-            Denial::NotPermitted {
+            FcsDenial::NotPermitted {
                 missing: Missing::Motion,
                 ..
             } => &[LimitSetting::Motion],
-            Denial::NotPermitted {
+            FcsDenial::NotPermitted {
                 missing: Missing::Eeprom,
                 ..
             } => &[LimitSetting::Eeprom],
-            Denial::Speed { .. } => &[LimitSetting::MaxSpeed],
+            FcsDenial::Speed { .. } => &[LimitSetting::MaxSpeed],
             _ => &[],
         };
         let denies = |setting: &&LimitSetting| match setting {
@@ -181,18 +181,18 @@ pub(crate) fn guarded<L: Link>(
 /// A line behind the gate of NORDAC inverters.
 pub(crate) trait GuardsSlaves {
     /// What the gate of a line of NORDAC inverters knows, if this line has one.
-    fn slaves(&self) -> Option<&guard::Gate>;
+    fn slaves(&self) -> Option<&guard::OctetGate>;
 
     /// The gate, mutable, to be told what was read.
-    fn slaves_mut(&mut self) -> Option<&mut guard::Gate>;
+    fn slaves_mut(&mut self) -> Option<&mut guard::OctetGate>;
 }
 
 impl<L: Line> GuardsSlaves for Guarded<L> {
-    fn slaves(&self) -> Option<&guard::Gate> {
+    fn slaves(&self) -> Option<&guard::OctetGate> {
         self.gate::<LineGate>(0).map(|gate| &gate.gate)
     }
 
-    fn slaves_mut(&mut self) -> Option<&mut guard::Gate> {
+    fn slaves_mut(&mut self) -> Option<&mut guard::OctetGate> {
         self.gate_mut::<LineGate>(0).map(|gate| &mut gate.gate)
     }
 }

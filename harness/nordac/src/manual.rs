@@ -2,7 +2,7 @@
 
 use harness_bench::bus_name::BusName;
 use harness_bench::manual::{Manual, Open};
-use harness_proto::nordac::properties::{Accepts, PROPERTIES};
+use harness_proto::nordac::properties::{Choices, PROPERTIES};
 
 /// The manual of PROFIBUS DP for NORDAC *vector*.
 pub(crate) const MANUAL: Manual = Manual {
@@ -19,8 +19,8 @@ fn open() -> Vec<Open> {
         section: property.section,
         name: property.name,
         values: match property.accepts {
-            Accepts::Words(words) => words.join(" or "),
-            Accepts::Count {
+            Choices::Words(words) => words.join(" or "),
+            Choices::Count {
                 least,
                 default,
                 most,

@@ -10,7 +10,7 @@ use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::guard::{Cause, Denial, Guard, Limits, Touched};
+use harness_proto::novobus::guard::{Cause, DeniedByte, Guard, Limits, Touched};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
 use std::any::Any;
@@ -61,7 +61,7 @@ impl RingGate {
     }
 
     /// Judges a byte as it will be, and as it would be if the port did not damage it.
-    fn admit_byte(&mut self, now: Instant, byte: u8) -> Result<(), Denial> {
+    fn admit_byte(&mut self, now: Instant, byte: u8) -> Result<(), DeniedByte> {
         let number = self.sent + 1;
         match self.damaged.get(&number) {
             None => self.guard.admit(now, byte, false)?,
@@ -75,7 +75,7 @@ impl RingGate {
         Ok(())
     }
 
-    fn denied(&self, denial: Denial) -> Denied {
+    fn denied(&self, denial: DeniedByte) -> Denied {
         Denied {
             why: format!("ring {}: {denial}", self.ring + 1),
             settings: self.limits.denying(denial.cause).collect(),

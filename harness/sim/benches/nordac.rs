@@ -5,7 +5,7 @@
 
 use divan::counter::ItemsCount;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
+use harness_proto::profibus::fdl::{FcFunction, FrameControl, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::{Drive, InverterSetup, Member};
@@ -34,7 +34,7 @@ fn request(number: usize) -> Vec<Octet> {
         2 => (None, &[0x17, 0x15, 0, 0, 0, 0, 0, 0, 0x04, 0x7E, 0, 0]),
         _ => (None, &[0x17, 0x15, 0, 0, 0, 0, 0, 0, 0x04, 0x7F, 0x40, 0]),
     };
-    let control = FrameControl::request(Function::SrdHigh, sequence);
+    let control = FrameControl::request(FcFunction::SrdHigh, sequence);
     let pdu = Pdu::with_saps(8, 2, control, sap, sap.map(|_| 62), data);
     let telegram = Telegram::Pdu(pdu.expect("a telegram"));
     telegram.encode().iter().copied().map(Octet::from).collect()

@@ -12,7 +12,7 @@ use std::any::Any;
 /// The gate of one port.
 #[derive(Clone, Debug)]
 pub(crate) struct SegmentGate {
-    gate: guard::Gate,
+    gate: guard::FrameGate,
     /// Nothing is sent.
     listen_only: bool,
 }
@@ -28,7 +28,7 @@ impl SegmentGate {
         listen_only: bool,
     ) -> Self {
         Self {
-            gate: guard::Gate::new(limits, rate, drives),
+            gate: guard::FrameGate::new(limits, rate, drives),
             listen_only,
         }
     }
@@ -175,18 +175,18 @@ pub(crate) fn guarded<L: Link>(
 /// A line behind the gate of a segment.
 pub(crate) trait GuardsSegment {
     /// What the gate of a segment knows, if this line has one.
-    fn segment(&self) -> Option<&guard::Gate>;
+    fn segment(&self) -> Option<&guard::FrameGate>;
 
     /// The gate, mutable, to be told what was read.
-    fn segment_mut(&mut self) -> Option<&mut guard::Gate>;
+    fn segment_mut(&mut self) -> Option<&mut guard::FrameGate>;
 }
 
 impl<L: Line> GuardsSegment for Guarded<L> {
-    fn segment(&self) -> Option<&guard::Gate> {
+    fn segment(&self) -> Option<&guard::FrameGate> {
         self.gate::<SegmentGate>(0).map(|gate| &gate.gate)
     }
 
-    fn segment_mut(&mut self) -> Option<&mut guard::Gate> {
+    fn segment_mut(&mut self) -> Option<&mut guard::FrameGate> {
         self.gate_mut::<SegmentGate>(0).map(|gate| &mut gate.gate)
     }
 }

@@ -12,7 +12,7 @@ use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::bit_timing::Nbt;
 use harness_proto::unitek::frame::{Data, Reply, Request};
-use harness_proto::unitek::guard::{Gate, Places};
+use harness_proto::unitek::guard::{FrameGate, Places};
 use harness_proto::unitek::units::{Given, Scaling, shown};
 use harness_proto::unitek::words::{ERRORS, MODE_LOCK, set_bits, status};
 
@@ -184,7 +184,7 @@ impl<L: Line> Place<'_, L> {
 
     /// Whether identifiers were written to any drive: another one may have taken them.
     fn may_have_moved(&self) -> bool {
-        let given = self.line.segment().map(Gate::given);
+        let given = self.line.segment().map(FrameGate::given);
         given.is_some_and(|given| given.iter().any(|ids| !ids.is_empty()))
     }
 

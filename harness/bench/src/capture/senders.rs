@@ -5,7 +5,7 @@ use crate::report::pcapng_telegrams::PacketOctet;
 use harness_proto::decode::Decoded;
 use harness_proto::line::{LineError, Received};
 use harness_proto::profibus::Telegram;
-use harness_proto::profibus::fdl::{BROADCAST, MAX_TELEGRAM, Reason};
+use harness_proto::profibus::fdl::{BROADCAST, MAX_TELEGRAM, Malformed};
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
@@ -275,7 +275,7 @@ impl TelegramCutter {
     }
 
     /// The telegram that begins at a place.
-    fn decoded(&self, place: usize) -> Decoded<Telegram, Reason> {
+    fn decoded(&self, place: usize) -> Decoded<Telegram, Malformed> {
         let octets = self.waiting.iter().skip(place).take(MAX_TELEGRAM);
         let good = octets.map_while(|(_, octet)| octet.error.is_none().then_some(octet.byte));
         Telegram::decode(&good.collect::<Vec<_>>())

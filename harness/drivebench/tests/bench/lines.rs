@@ -3,7 +3,7 @@
 
 use crate::edits;
 use crate::program::{Desk, ended, said};
-use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
+use harness_proto::nordac::properties::{Choices, NordacProperty, PROPERTIES};
 use std::process::Output;
 
 /// Drives of a bus behind a port.
@@ -338,10 +338,10 @@ fn edited(desk: &Desk, file: &str, from: &str, to: &str) {
 }
 
 /// The values of an open point: every word, or the least, the greatest and the neighbours of the default.
-fn values(property: &Description) -> Vec<String> {
+fn values(property: &NordacProperty) -> Vec<String> {
     match property.accepts {
-        Accepts::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
-        Accepts::Count {
+        Choices::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
+        Choices::Count {
             least,
             default,
             most,

@@ -447,8 +447,8 @@ fn every_property_is_exercised_and_described() {
         let name = property.name;
         assert!(page.contains(&format!("| `{name}` |")), "{name}");
         let values: &[&str] = match property.accepts {
-            harness_proto::nordac::properties::Accepts::Words(words) => words,
-            harness_proto::nordac::properties::Accepts::Count { .. } => &[""],
+            harness_proto::nordac::properties::Choices::Words(words) => words,
+            harness_proto::nordac::properties::Choices::Count { .. } => &[""],
         };
         for value in values {
             let set = format!("property {name} = {value}");

@@ -10,7 +10,7 @@ use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::profibus::dp::{Diagnosis, Service};
-use harness_proto::profibus::fdl::{Function, MAX_TELEGRAM, Status};
+use harness_proto::profibus::fdl::{FcFunction, FcStatus, MAX_TELEGRAM};
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
 use harness_proto::profibus::{BusRate, Pdu, Telegram};
 use harness_proto::time::{Instant, Span};
@@ -230,14 +230,14 @@ impl<'l> MasterLine<'l> {
         let request = Telegram::decode(octets).value();
         let pdu = request.as_ref().and_then(Telegram::pdu).copied();
         let function = pdu.and_then(|pdu| pdu.fc().function());
-        if function == Some(Function::FdlStatus) {
+        if function == Some(FcFunction::FdlStatus) {
             let sent = self.timing.rate.octet_time() * octets.len() as u64;
             // A microsecond more for each time that the master rounds.
             self.ahead = self.ahead + sent + self.timing.slot_time() + Span::from_micros(4);
             return;
         }
         self.let_pass_what_is_late();
-        self.asked = pdu.filter(|_| function.is_some_and(Function::is_srd));
+        self.asked = pdu.filter(|_| function.is_some_and(FcFunction::is_srd));
         self.left = self.line.send(0, Out::Octets(octets));
         if self.line.refused() > 0 && self.line.trouble().is_none() {
             self.failed = Some(Error::NotSent);
@@ -303,7 +303,7 @@ impl<'l> MasterLine<'l> {
             return;
         };
         let service = Service::of(asked.dsap());
-        if pdu.fc().status() == Some(Status::Rs) {
+        if pdu.fc().status() == Some(FcStatus::Rs) {
             self.not_activated = service;
         } else if service == Some(Service::SlaveDiag) {
             self.diagnosis = Diagnosis::decode(pdu.data());
@@ -389,7 +389,7 @@ mod tests {
 
         fn send(&mut self, _port: usize, _what: Out<'_>) -> Instant {
             self.asked += 1;
-            let fc = FrameControl::reply(Status::DataLow);
+            let fc = FrameControl::reply(FcStatus::DataLow);
             let reply = Pdu::new(2, 8, fc, &[self.asked]).expect("a reply");
             let at = self.now + Span::from_millis(300);
             let octets = Telegram::Pdu(reply).encode();

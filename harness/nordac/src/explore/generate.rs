@@ -8,7 +8,7 @@ use harness_bench::explore::{Dice, Spiced};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Pkw, PpoType};
 use harness_proto::profibus::dp::{Service, SetPrm};
-use harness_proto::profibus::fdl::{Function, check_sum};
+use harness_proto::profibus::fdl::{FcFunction, check_sum};
 
 /// Something that a conversation of telegrams can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -201,7 +201,7 @@ fn exchange(wire: Wire, control: u16, dice: &mut Dice) -> TelegramAct {
 
 fn service(wire: Wire, dice: &mut Dice) -> TelegramAct {
     if dice.percent(20) {
-        let mut status = wire.request(Function::FdlStatus, Service::DataExchange, &[]);
+        let mut status = wire.request(FcFunction::FdlStatus, Service::DataExchange, &[]);
         status.count = Count::Without;
         return TelegramAct::new(TelegramActKind::Ask(status), 0);
     }
@@ -246,7 +246,7 @@ fn set_up(wire: Wire, dice: &mut Dice) -> TelegramAct {
 pub(super) const fn by_srd(act: &mut TelegramAct, slave: u8) {
     if let TelegramActKind::Ask(request) = &mut act.what {
         (request.da, request.function, request.count) =
-            (slave, Function::SrdHigh.code(), Count::Next);
+            (slave, FcFunction::SrdHigh.code(), Count::Next);
     }
 }
 

@@ -21,7 +21,7 @@ use harness_bench::link::{Line as _, Octets as _};
 use harness_bench::rig::{Ends, Rig};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::PpoType;
-use harness_proto::profibus::fdl::{BROADCAST, Function, Pdu};
+use harness_proto::profibus::fdl::{BROADCAST, FcFunction, Pdu};
 use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
@@ -248,7 +248,7 @@ impl Conversation<'_> {
             Decoded::Value { value, used } if used == octets.len() => {
                 let pdu = value.pdu();
                 self.asked = pdu.map(|pdu| pdu.da());
-                let sends_only = |pdu: &Pdu| pdu.fc().function().is_some_and(Function::is_sdn);
+                let sends_only = |pdu: &Pdu| pdu.fc().function().is_some_and(FcFunction::is_sdn);
                 pdu.is_some_and(|pdu| pdu.da() != BROADCAST && !sends_only(pdu))
             }
             // Somebody may read a request out of it.

@@ -5,7 +5,7 @@ use super::play::{PlayedAct, TelegramsSeen};
 use crate::judge::{ReplySubject, Symptom};
 use crate::simulate::Setup;
 use harness_bench::capture::runs::HeardTelegram;
-use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
+use harness_proto::nordac::properties::{Choices, NordacProperty, PROPERTIES, Properties};
 use harness_proto::profibus::Telegram;
 use serde::{Deserialize, Serialize};
 
@@ -33,11 +33,11 @@ pub(crate) struct TelegramDifference {
 }
 
 /// Every property with each of its values.
-fn values() -> impl Iterator<Item = (&'static Description, String)> {
+fn values() -> impl Iterator<Item = (&'static NordacProperty, String)> {
     PROPERTIES.iter().flat_map(|property| {
         let words: Vec<String> = match property.accepts {
-            Accepts::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
-            Accepts::Count { least, most, .. } => {
+            Choices::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
+            Choices::Count { least, most, .. } => {
                 (least..=most).map(|count| count.to_string()).collect()
             }
         };

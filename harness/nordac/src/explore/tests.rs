@@ -5,7 +5,7 @@ use crate::language::Nordac;
 use harness_bench::explore::line::trial::EngineTrial;
 use harness_bench::rig::find;
 use harness_proto::nordac::PpoType;
-use harness_proto::nordac::properties::{Accepts, PROPERTIES};
+use harness_proto::nordac::properties::{Choices, PROPERTIES};
 use harness_sim::nordac::deviation::DEVIATIONS;
 use std::path::Path;
 
@@ -37,8 +37,8 @@ fn open_points() -> Vec<Vec<String>> {
     let mut all = vec![Vec::new()];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(ToString::to_string).collect(),
-            Accepts::Count {
+            Choices::Words(words) => words.iter().skip(1).map(ToString::to_string).collect(),
+            Choices::Count {
                 least,
                 default,
                 most,

@@ -3,7 +3,7 @@
 use super::act::{Count, Request, TelegramAct, TelegramActKind};
 use harness_proto::nordac::{IDENT, Image, Pkw, PpoType};
 use harness_proto::profibus::dp::{GlobalControl, Service, SetPrm};
-use harness_proto::profibus::fdl::Function;
+use harness_proto::profibus::fdl::FcFunction;
 
 /// The master that starts the slave.
 pub(super) const OWN: u8 = 2;
@@ -28,7 +28,7 @@ impl From<(u8, PpoType)> for Wire {
 
 impl Wire {
     /// Any request, with its data.
-    pub(super) fn request(self, function: Function, service: Service, data: &[u8]) -> Request {
+    pub(super) fn request(self, function: FcFunction, service: Service, data: &[u8]) -> Request {
         let sap = service.sap();
         Request {
             da: self.slave,
@@ -43,8 +43,8 @@ impl Wire {
 
     fn act(self, service: Service, data: &[u8]) -> TelegramAct {
         let function = match service {
-            Service::DataExchange => Function::SrdHigh,
-            _ => Function::SrdLow,
+            Service::DataExchange => FcFunction::SrdHigh,
+            _ => FcFunction::SrdLow,
         };
         TelegramAct::new(
             TelegramActKind::Ask(self.request(function, service, data)),
@@ -86,7 +86,7 @@ impl Wire {
     /// Global_Control to this station.
     pub(super) fn control(self, da: u8, command: u8, group: u8) -> TelegramAct {
         let mut request = self.request(
-            Function::SdnHigh,
+            FcFunction::SdnHigh,
             Service::GlobalControl,
             &GlobalControl { command, group }.encode(),
         );

@@ -6,7 +6,7 @@ use super::symptom::Symptom::{self, Form, Value};
 use harness_proto::nordac::{IDENT, Image, PpoType};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
-use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
+use harness_proto::profibus::fdl::{BROADCAST, FcFunction, FcStatus, Form as Shape, Pdu};
 use harness_proto::time::Instant;
 
 /// The way of a slave into the exchange, as far as it was heard.
@@ -123,14 +123,14 @@ impl Follower {
         let Some(function) = request.fc().function() else {
             return form("an unknown function is answered");
         };
-        let counts = function != Function::FdlStatus && !function.is_sdn();
+        let counts = function != FcFunction::FdlStatus && !function.is_sdn();
         if counts && let Some(found) = self.repetition(request, octets) {
             return found;
         }
         if let Some(found) = self.head(function, request, reply) {
             return Some(found);
         }
-        if function == Function::FdlStatus {
+        if function == FcFunction::FdlStatus {
             let right = matches!(reply, Telegram::Pdu(pdu) if pdu.fc().0 == 0);
             return (!right).then(|| (Form, "EN 1", "FC 00 is expected".to_owned()));
         }
@@ -150,7 +150,7 @@ impl Follower {
     }
 
     /// Who may reply, to whom, and with which service access points.
-    fn head(&self, function: Function, request: &Pdu, reply: &Telegram) -> Mismatch {
+    fn head(&self, function: FcFunction, request: &Pdu, reply: &Telegram) -> Mismatch {
         if function.is_sdn() {
             return form("a telegram without acknowledgement is answered");
         }
@@ -168,16 +168,16 @@ impl Follower {
         let saps = (reply_pdu.dsap(), reply_pdu.ssap()) == (request.ssap(), request.dsap());
         match reply_pdu.fc().status() {
             None => form("its FC is none of a slave's reply"),
-            Some(Status::DataLow | Status::DataHigh) if !saps => {
+            Some(FcStatus::DataLow | FcStatus::DataHigh) if !saps => {
                 form("its service access points are not those of the request in the other order")
             }
-            Some(Status::DataHigh) if request.dsap().is_some() => {
+            Some(FcStatus::DataHigh) if request.dsap().is_some() => {
                 form("only Data_Exchange reports that a diagnosis waits")
             }
-            Some(Status::Ok) if function != Function::FdlStatus => {
+            Some(FcStatus::Ok) if function != FcFunction::FdlStatus => {
                 form("FC 00 replies to FDL status only")
             }
-            Some(Status::Ok | Status::Rs) if reply_pdu.form() != Shape::Plain => {
+            Some(FcStatus::Ok | FcStatus::Rs) if reply_pdu.form() != Shape::Plain => {
                 form("a reply without data is an SD1 without service access points")
             }
             _ => None,
@@ -467,5 +467,5 @@ fn shown_by(inputs: &[u8]) -> Option<PpoType> {
 
 /// Whether a telegram is RS.
 fn is_refusal(telegram: &Telegram) -> bool {
-    matches!(telegram, Telegram::Pdu(pdu) if pdu.fc().status() == Some(Status::Rs))
+    matches!(telegram, Telegram::Pdu(pdu) if pdu.fc().status() == Some(FcStatus::Rs))
 }

@@ -13,7 +13,7 @@ use harness_proto::decode::Decoded;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::fdl::{
-    BROADCAST, ED, Form as Shape, Function, Pdu, Reason, SD1, SD2, SD3, check_sum,
+    BROADCAST, ED, FcFunction, Form as Shape, Malformed, Pdu, SD1, SD2, SD3, check_sum,
 };
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -101,17 +101,17 @@ fn is_complete(said: &HeardTelegram) -> bool {
         Decoded::NeedMore => return false,
         Decoded::Bad { reason, offset } => (reason, said.octets.len() - 1 - offset),
     };
-    [(Reason::CheckSum, 1), (Reason::End, 0)].contains(&left)
+    [(Malformed::CheckSum, 1), (Malformed::End, 0)].contains(&left)
 }
 
 /// Whether octets are as their sender sent them, though they are no telegram: all checks of a tap hold, and an address or a control octet is
 /// one that no slave may answer.
 fn is_undamaged(said: &HeardTelegram) -> bool {
     let reasons = [
-        Reason::Source,
-        Reason::Control,
-        Reason::Sap,
-        Reason::SapMissing,
+        Malformed::Source,
+        Malformed::Control,
+        Malformed::Sap,
+        Malformed::SapMissing,
     ];
     let Decoded::Bad { reason, .. } = Telegram::decode(&said.octets) else {
         return false;
@@ -317,7 +317,7 @@ impl Judge {
             return;
         };
         let answered = match pdu.fc().function() {
-            Some(Function::FdlStatus) => pdu.form() == Shape::Plain,
+            Some(FcFunction::FdlStatus) => pdu.form() == Shape::Plain,
             Some(function) => function.is_srd(),
             None => false,
         };

@@ -3,7 +3,7 @@
 use harness_proto::nordac::{Image, PpoType};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
-use harness_proto::profibus::fdl::{Function, Pdu};
+use harness_proto::profibus::fdl::{FcFunction, Pdu};
 use serde::{Deserialize, Serialize};
 
 /// How slaves differ from the model.
@@ -55,7 +55,7 @@ impl ReplySubject {
         let function = pdu.and_then(|pdu| pdu.fc().function());
         let (part, section) = match (pdu, function) {
             (None, _) => ("octets that are no request", "EN 1"),
-            (Some(_), Some(Function::FdlStatus)) => ("FDL status", "EN 1"),
+            (Some(_), Some(FcFunction::FdlStatus)) => ("FDL status", "EN 1"),
             (Some(pdu), Some(function)) if function.is_srd() => match Service::of(pdu.dsap()) {
                 Some(service) => (service.name(), section_of(service)),
                 None => ("another service access point", "EN 2"),

@@ -8,7 +8,7 @@ use harness_bench::scenario::files::sources;
 use harness_bench::scenario::run::AtMismatch;
 use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
-use harness_proto::nordac::properties::{Accepts, PROPERTIES};
+use harness_proto::nordac::properties::{Choices, PROPERTIES};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::deviation::DEVIATIONS;
 use harness_sim::record::{LineByte, Trace};
@@ -112,8 +112,8 @@ fn right_slaves(share: usize) -> usize {
     let mut lines = vec![String::new()];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words[1..].iter().copied().map(str::to_owned).collect(),
-            Accepts::Count { .. } => vec!["1".to_owned(), "4".to_owned()],
+            Choices::Words(words) => words[1..].iter().copied().map(str::to_owned).collect(),
+            Choices::Count { .. } => vec!["1".to_owned(), "4".to_owned()],
         };
         lines.extend(
             values

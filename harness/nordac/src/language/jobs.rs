@@ -12,7 +12,7 @@ use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Answer, IDENT, Image, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
-use harness_proto::profibus::fdl::{FrameControl, Function, Sequence, Status};
+use harness_proto::profibus::fdl::{FcFunction, FcStatus, FrameControl, Sequence};
 use harness_proto::profibus::{Buffer, Pdu, Telegram};
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
@@ -192,7 +192,7 @@ fn ask(
     runner: &mut Runner<'_, Nordac>,
     span: TextSpan,
     slave: u8,
-    function: Function,
+    function: FcFunction,
     service: Service,
     data: &[u8],
 ) -> Result<Telegram, Stop> {
@@ -271,7 +271,9 @@ fn data(span: TextSpan, slave: u8, telegram: Telegram, what: &str) -> Result<Buf
         return wrong(format!("a telegram from {} to {}", pdu.sa(), pdu.da()));
     }
     match pdu.fc().status() {
-        Some(Status::DataLow | Status::DataHigh) => Ok(Buffer::of(pdu.data()).unwrap_or_default()),
+        Some(FcStatus::DataLow | FcStatus::DataHigh) => {
+            Ok(Buffer::of(pdu.data()).unwrap_or_default())
+        }
         Some(status) => wrong(format!("{} (FC {:02X})", status.name(), pdu.fc().0)),
         None => wrong(format!("FC {:02X}, which is no reply", pdu.fc().0)),
     }
@@ -301,7 +303,7 @@ fn start(
     ];
     diagnose(runner, span, slave)?;
     for (service, octets) in steps {
-        let reply = ask(runner, span, slave, Function::SrdLow, service, octets)?;
+        let reply = ask(runner, span, slave, FcFunction::SrdLow, service, octets)?;
         if reply != Telegram::Confirmation {
             let found = reply.encode();
             let name = service.name();
@@ -321,7 +323,7 @@ fn start(
 
 fn diagnose(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<Diagnosis, Stop> {
     let service = Service::SlaveDiag;
-    let reply = ask(runner, span, slave, Function::SrdLow, service, &[])?;
+    let reply = ask(runner, span, slave, FcFunction::SrdLow, service, &[])?;
     let octets = data(span, slave, reply, service.name())?;
     Diagnosis::decode(&octets).ok_or_else(|| {
         let message = format!("slave {slave} sends a diagnosis of a wrong form: {octets}");
@@ -335,7 +337,7 @@ fn exchange(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Resul
     let ppo = known.ppo.unwrap_or_default();
     let octets = known.sent.encode(ppo);
     let service = Service::DataExchange;
-    let reply = ask(runner, span, slave, Function::SrdHigh, service, &octets)?;
+    let reply = ask(runner, span, slave, FcFunction::SrdHigh, service, &octets)?;
     let octets = data(span, slave, reply, service.name())?;
     Image::decode(ppo, &octets).ok_or_else(|| {
         let (found, wanted) = (octets.len(), ppo.octets());

@@ -4,7 +4,7 @@ use harness_bench::scenario::expression::Located;
 use harness_bench::scenario::pattern::Pattern;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::times::Duration;
-use harness_proto::nordac::properties::Description;
+use harness_proto::nordac::properties::NordacProperty;
 use harness_proto::nordac::{Parameter, PpoType};
 use harness_proto::profibus::BusRate;
 use harness_sim::fault::{Flips, LinkFault};
@@ -38,7 +38,7 @@ pub(crate) enum SetupKind {
         posicon: bool,
     },
     /// `property pzd-invalid = hold`.
-    Property(&'static Description, String),
+    Property(&'static NordacProperty, String),
     /// `parameter 1205 = 70.0Hz`.
     Parameter(ParameterName, WrittenValue),
     /// `deviates NAME`.

@@ -6,7 +6,7 @@ use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::{State, ZSW, stw, zsw};
 use harness_proto::nordac::{Answer, Image, Parameter, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service, SetPrm};
-use harness_proto::profibus::fdl::Status;
+use harness_proto::profibus::fdl::FcStatus;
 use harness_proto::profibus::{Pdu, Telegram};
 use std::collections::BTreeMap;
 
@@ -125,11 +125,11 @@ impl Reader {
         let service = asked.map(|(_, service)| service);
         let name = service.map_or("FDL status", Service::name).to_owned();
         let meaning = match (pdu.fc().status(), service) {
-            (Some(Status::Ok), _) => "OK".to_owned(),
-            (Some(Status::Rs), _) => "RS: no service activated".to_owned(),
+            (Some(FcStatus::Ok), _) => "OK".to_owned(),
+            (Some(FcStatus::Rs), _) => "RS: no service activated".to_owned(),
             (Some(status), Some(service)) => {
                 let diagnosis = match status {
-                    Status::DataHigh => "diagnosis waits; ",
+                    FcStatus::DataHigh => "diagnosis waits; ",
                     _ => "",
                 };
                 format!("{diagnosis}{}", self.answer(service, pdu))

@@ -5,7 +5,7 @@ use super::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Description, PROPERTIES, Properties, SubindexBits};
+use harness_proto::nordac::properties::{NordacProperty, PROPERTIES, Properties, SubindexBits};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Answer, Image, PARAMETERS, Parameter, Pkw, PpoType, Task};
 use harness_sim::nordac::History;
@@ -67,13 +67,13 @@ impl KnownInverters {
     }
 
     /// Whether every value of a property but that of [`Self::properties`] is excluded.
-    pub(super) fn is_settled(&self, property: &Description) -> bool {
+    pub(super) fn is_settled(&self, property: &NordacProperty) -> bool {
         let held = value_of(property, &self.properties);
         let mut open = self.open.iter();
         open.all(|(_, other)| value_of(property, other) == held)
     }
 
-    pub(super) fn settle(&mut self, property: &Description, word: &str) {
+    pub(super) fn settle(&mut self, property: &NordacProperty, word: &str) {
         let mut all = std::mem::take(&mut self.open);
         all.retain_mut(|(_, other)| property.set(other, word));
         let _fits = property.set(&mut self.properties, word);
@@ -238,7 +238,7 @@ fn indices(parameter: &Parameter) -> impl Iterator<Item = u16> {
 /// The properties that differ from these in one point that the manual leaves open and that `may` differ, each with the words of the difference.
 pub(super) fn candidates(
     base: Properties,
-    may: impl Fn(&Description) -> bool,
+    may: impl Fn(&NordacProperty) -> bool,
 ) -> Vec<(String, Properties)> {
     let mut all = Vec::new();
     for property in PROPERTIES.iter().filter(|property| may(property)) {
@@ -252,7 +252,7 @@ pub(super) fn candidates(
     all
 }
 
-pub(super) fn value_of(property: &Description, properties: &Properties) -> String {
+pub(super) fn value_of(property: &NordacProperty, properties: &Properties) -> String {
     let holds = |word: &String| {
         let mut changed = *properties;
         property.set(&mut changed, word) && changed == *properties

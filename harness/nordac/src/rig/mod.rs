@@ -33,7 +33,7 @@ use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::GuardedSlave;
-use harness_proto::nordac::properties::{Accepts, Description};
+use harness_proto::nordac::properties::{Choices, NordacProperty};
 use harness_proto::profibus::BusRate;
 use std::collections::BTreeSet;
 
@@ -166,13 +166,13 @@ pub(crate) fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
 const MOST_NUMBERS: u8 = 20;
 
 /// Values of a property: each of its words or numbers; of many numbers some from the least to the most.
-pub(crate) fn values(property: &Description) -> Vec<String> {
+pub(crate) fn values(property: &NordacProperty) -> Vec<String> {
     match property.accepts {
-        Accepts::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
-        Accepts::Count { least, most, .. } if most - least < MOST_NUMBERS => {
+        Choices::Words(words) => words.iter().map(|word| (*word).to_owned()).collect(),
+        Choices::Count { least, most, .. } if most - least < MOST_NUMBERS => {
             (least..=most).map(|number| number.to_string()).collect()
         }
-        Accepts::Count {
+        Choices::Count {
             least,
             default,
             most,

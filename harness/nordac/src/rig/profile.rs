@@ -11,11 +11,11 @@ use harness_bench::scenario::parse::header::{Part, read};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
-use harness_proto::nordac::properties::{Description, Properties};
+use harness_proto::nordac::properties::{NordacProperty, Properties};
 
 /// The properties of slaves that a profile says: the address of the slave, the property and its value.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ProfileSettings(Vec<(u8, &'static Description, String)>);
+pub(super) struct ProfileSettings(Vec<(u8, &'static NordacProperty, String)>);
 
 impl ProfileSettings {
     /// The settings of a rig's profile; empty where its file names none.

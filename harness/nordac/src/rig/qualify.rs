@@ -12,7 +12,7 @@ use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
 use harness_proto::nordac::guard::Limits;
-use harness_proto::nordac::properties::{Description, PROPERTIES};
+use harness_proto::nordac::properties::{NordacProperty, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
 use include_dir::{Dir, include_dir};
 
@@ -89,7 +89,7 @@ const NEEDS: [(&str, ProbeNeeds, &str); 38] = [
     ("reinit", ProbeNeeds::Never, ""),
 ];
 
-fn why_open(property: &Description, limits: &Limits) -> String {
+fn why_open(property: &NordacProperty, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
     let why = match needs.map_or(ProbeNeeds::Nothing, |(_, needs, _)| *needs) {
         ProbeNeeds::Eeprom if !limits.eeprom => "not asked: this needs `allow_eeprom` in [limits]",
@@ -206,7 +206,8 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
 fn settle(slaves: &mut [KnownInverters], place: usize, notes: &[&SlaveNote]) {
     let address = slaves[place].slave.address;
     for (name, _, conversation) in NEEDS {
-        let property = Description::of(name).filter(|property| !slaves[place].is_settled(property));
+        let property =
+            NordacProperty::of(name).filter(|property| !slaves[place].is_settled(property));
         let Some(property) = property else { continue };
         let shown = format!("{CONVERSATION}{conversation}");
         let of_slave = format!("{shown}-slave-{address}");
@@ -252,7 +253,7 @@ mod tests {
     #[test]
     fn every_need_is_of_a_property_and_its_conversation_is_there() {
         for (name, _, shown) in NEEDS {
-            assert!(Description::of(name).is_some(), "{name}");
+            assert!(NordacProperty::of(name).is_some(), "{name}");
             let file = format!("{shown}.scn");
             assert!(shown.is_empty() || CONVERSATIONS.contains(file), "{name}");
         }

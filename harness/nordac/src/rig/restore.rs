@@ -14,7 +14,7 @@ use crate::value::shown;
 use harness_bench::guard::Guarded;
 use harness_bench::link::Line;
 use harness_bench::medium::Pieces;
-use harness_proto::nordac::guard::{Class, class};
+use harness_proto::nordac::guard::{TaskClass, class};
 use harness_proto::nordac::master::ExchangeError;
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::SubindexBits;
@@ -170,7 +170,9 @@ fn commands(known: &KnownInverters, at: RigSlave, places: &[Place], origin: &str
     if values.is_empty() {
         return String::new();
     }
-    let moves = places.iter().any(|place| class(place.0) == Class::Speed);
+    let moves = places
+        .iter()
+        .any(|place| class(place.0) == TaskClass::Speed);
     let moves = if moves { " --move" } else { "" };
     let (slave, at) = (known.slave.address, at.address);
     let first = match slave == at {

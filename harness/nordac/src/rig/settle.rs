@@ -7,7 +7,7 @@ use super::known::{KnownInverters, candidates};
 use super::observed::{Agreement, WHOLE};
 use super::talk::{Talk, TalkError};
 use harness_bench::qualify::search::{JudgedValues, SearchOutcome, SearchWay, explain};
-use harness_proto::nordac::properties::{Description, Properties};
+use harness_proto::nordac::properties::{NordacProperty, Properties};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{IDENT, Image, Pkw};
 use harness_proto::profibus::dp::{Service, SetPrm};
@@ -136,7 +136,7 @@ pub(super) type Assumptions = Vec<Properties>;
 /// difference; none if there are no such.
 pub(super) fn search(
     base: &Assumptions,
-    may: impl Fn(usize, &Description) -> bool,
+    may: impl Fn(usize, &NordacProperty) -> bool,
     mut explains: impl FnMut(&Assumptions) -> Agreement,
 ) -> Vec<(String, Assumptions)> {
     let agreement = |(_, slaves): &_| Some(explains(slaves)).filter(|agreed| *agreed != WHOLE);
@@ -149,7 +149,7 @@ pub(super) fn search(
             .filter(|(_, (words, _))| seen.contains(name_of(words)))
             .flat_map(|(_, (words, slaves))| {
                 // Each pair in one order, and no property twice.
-                let later = |place: usize, property: &Description| {
+                let later = |place: usize, property: &NordacProperty| {
                     let name = name_of(words);
                     let done = seen.contains(property.name) && property.name <= name;
                     property.name != name && !done && may(place, property)
@@ -174,7 +174,7 @@ fn name_of(words: &str) -> &str {
 /// What differs in one point from these slaves.
 fn steps(
     from: &Assumptions,
-    may: impl Fn(usize, &Description) -> bool,
+    may: impl Fn(usize, &NordacProperty) -> bool,
 ) -> Vec<(String, Assumptions)> {
     let of = |place: usize| {
         let near = candidates(from[place], |property| may(place, property));
@@ -207,7 +207,7 @@ pub(super) fn settle(
 mod tests {
     use super::super::known::value_of;
     use super::{Assumptions, WHOLE, search};
-    use harness_proto::nordac::properties::{Description, PROPERTIES, Properties};
+    use harness_proto::nordac::properties::{NordacProperty, PROPERTIES, Properties};
 
     /// What a slave does may follow from two points together, of which neither alone explains more than the default.
     #[test]
@@ -228,7 +228,7 @@ mod tests {
         let found = search(&base, |_, _| true, explains);
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(explains(&found[0].1), WHOLE);
-        let fixed = |_: usize, property: &Description| property.name != "subindex-bits";
+        let fixed = |_: usize, property: &NordacProperty| property.name != "subindex-bits";
         assert!(search(&base, fixed, explains).is_empty());
     }
 }

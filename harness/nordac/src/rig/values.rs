@@ -1,6 +1,6 @@
 //! The values that a walk writes to parameters: both ends of the range that the manual prints, and the next values beyond them.
 
-use harness_proto::nordac::guard::{Class, class};
+use harness_proto::nordac::guard::{TaskClass, class};
 use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::{PARAMETERS, Parameter};
 
@@ -42,21 +42,21 @@ fn kind(parameter: &Parameter) -> Option<(&'static str, Option<&'static str>)> {
     match (class(parameter.number), parameter.number) {
         _ if parameter.has(Flag::ReadOnly) || parameter.is_array() => None,
         (
-            Class::Stored,
+            TaskClass::Stored,
             971 | 1206 | 1207 | 1500 | 1504 | 1505 | 1601 | 1603 | 1618 | 1620 | 1623,
         ) => Some((
             "values of modes",
             Some("they change who controls the inverter, or what its inputs do"),
         )),
-        (Class::Stored, 1517 | 1518 | 1527..=1542) => {
+        (TaskClass::Stored, 1517 | 1518 | 1527..=1542) => {
             Some(("values of outputs", Some("they switch an output at once")))
         }
-        (Class::Stored, _) => Some(("values of parameters", None)),
-        (Class::MotorData | Class::Speed, _) => Some((
+        (TaskClass::Stored, _) => Some(("values of parameters", None)),
+        (TaskClass::MotorData | TaskClass::Speed, _) => Some((
             "values of motor data",
             Some("a wrong value could damage the motor, or start it"),
         )),
-        (Class::BusSettings | Class::Everything | Class::Never, _) => None,
+        (TaskClass::BusSettings | TaskClass::Everything | TaskClass::Never, _) => None,
     }
 }
 

@@ -6,7 +6,7 @@
 use super::RigSlave;
 use super::values::values;
 use harness_bench::qualify::walk::{Walk, WalkBounds, WalkModel, walk};
-use harness_proto::nordac::guard::{Denial, Gate, GuardedSlave, Limits};
+use harness_proto::nordac::guard::{FcsDenial, GuardedSlave, Limits, OctetGate};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Image, Parameter, Pkw, Task};
 use harness_proto::profibus::dp::Service;
@@ -85,7 +85,7 @@ pub(super) struct State {
 #[derive(Clone)]
 struct Model {
     inverter: Inverter,
-    gate: Gate,
+    gate: OctetGate,
     requests: Requests,
     slave: RigSlave,
     image: Image,
@@ -106,7 +106,7 @@ impl Model {
             address: slave.address,
             ppo: slave.ppo,
         };
-        let mut gate = Gate::new(limits, BusRate::K500, &[guarded]);
+        let mut gate = OctetGate::new(limits, BusRate::K500, &[guarded]);
         gate.learn(slave.address, 1625, 0, 100);
         Some(Self {
             inverter: Inverter::new(&setup, Instant::START),
@@ -129,7 +129,7 @@ impl Model {
         for octet in Telegram::Pdu(pdu).encode().iter() {
             let admitted = self.gate.admit(self.now, *octet);
             admitted.map_err(|denial| match denial {
-                Denial::NotPermitted { missing, .. } => format!("needs {}", missing.name()),
+                FcsDenial::NotPermitted { missing, .. } => format!("needs {}", missing.name()),
                 other => other.to_string(),
             })?;
         }

@@ -9,8 +9,8 @@ use harness_bench::link::{DriveFault, Link, Moment, Octets, PlacedFault, Trouble
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Description, PROPERTIES};
-use harness_proto::profibus::fdl::{FrameControl, Function, Sequence};
+use harness_proto::nordac::properties::{NordacProperty, PROPERTIES};
+use harness_proto::profibus::fdl::{FcFunction, FrameControl, Sequence};
 use harness_proto::profibus::{BusRate, Pdu};
 use harness_sim::nordac::deviation::DEVIATIONS;
 
@@ -111,10 +111,10 @@ fn other_ways_in() {
             // Sync and Freeze, which Set_Prm asked for.
             0 => {
                 let prm = [0xB8, 1, 100, 0, 0x75, 0x31, 0];
-                let control = FrameControl::request(Function::SrdLow, Sequence::First);
+                let control = FrameControl::request(FcFunction::SrdLow, Sequence::First);
                 let pdu = Pdu::with_saps(8, MASTER, control, Some(61), Some(62), &prm);
                 let prm = Telegram::Pdu(pdu.expect("fits")).encode();
-                let control = FrameControl::request(Function::SrdLow, Sequence::None);
+                let control = FrameControl::request(FcFunction::SrdLow, Sequence::None);
                 let cfg = PpoType::One.cfg();
                 let pdu = Pdu::with_saps(8, MASTER, control, Some(62), Some(62), cfg);
                 let cfg = Telegram::Pdu(pdu.expect("fits")).encode();
@@ -154,7 +154,7 @@ fn other_ways_in() {
 fn a_late_reply_is_not_taken_for_another() {
     let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::unlimited());
     run(&mut line, &slaves);
-    let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+    let control = FrameControl::request(FcFunction::SrdHigh, Sequence::First);
     let words = Image::of_words(stw::START, 0).encode(PpoType::One);
     let exchange = Pdu::new(8, MASTER, control, &words).expect("fits");
     line.send_octets(0, &Telegram::Pdu(exchange).encode());
@@ -208,7 +208,7 @@ fn a_begun_telegram_does_not_keep_the_stop_back() {
     let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
     // 047F with an HSW that makes the FCS 68.
     let telegram = (0..=u16::MAX).find_map(|main| {
-        let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+        let control = FrameControl::request(FcFunction::SrdHigh, Sequence::First);
         let words = Image::of_words(stw::START, main);
         let pdu = Pdu::new(8, MASTER, control, &words.encode(PpoType::One)).ok()?;
         let octets = Telegram::Pdu(pdu).encode().to_vec();
@@ -259,7 +259,7 @@ fn last_words_switch_every_output_off() {
 /// and an inverter whose output stays on is never confirmed by it (NORDAC 2.6, 3.2.2).
 #[test]
 fn a_computer_that_stands_still_accuses_no_inverter() {
-    let latency = Description::of("pzd-latency");
+    let latency = NordacProperty::of("pzd-latency");
     let latency = latency.expect("an open point");
     let orders = [
         vec![StandstillStep::Stop, StandstillStep::Block],

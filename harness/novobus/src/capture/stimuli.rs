@@ -2,7 +2,7 @@
 
 use crate::report::meaning::{self, Observer};
 use harness_proto::line::Received;
-use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::nd21::cells::{CellAccess, cell_at};
 use harness_proto::nd21::own::is_own;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
@@ -312,10 +312,10 @@ fn cell_exists(address: u16) -> bool {
 
 /// Whether the drive may write a cell although a master can write it too; a reserved one is compared.
 fn is_of_the_drive(address: u16) -> bool {
-    is_own(address) && cell_at(address).is_none_or(|cell| cell.access != Access::Reserved)
+    is_own(address) && cell_at(address).is_none_or(|cell| cell.access != CellAccess::Reserved)
 }
 
 /// Whether the drive itself writes a cell (14.2: read only).
 fn measured(address: u16) -> bool {
-    cell_at(address).is_some_and(|cell| cell.access != Access::Write)
+    cell_at(address).is_some_and(|cell| cell.access != CellAccess::Write)
 }

@@ -3,13 +3,13 @@
 use harness_bench::command::args::CellsArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::output::Output;
-use harness_proto::nd21::cells::{Access, Cell, RAM};
+use harness_proto::nd21::cells::{Cell, CellAccess, RAM};
 use harness_proto::nd21::eeprom::EEPROM;
 
 /// The printed names of the cells that can be read, first those of the RAM.
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     let all = RAM.iter().chain(EEPROM);
-    let used = all.filter(|cell| cell.access != Access::Reserved);
+    let used = all.filter(|cell| cell.access != CellAccess::Reserved);
     used.map(|cell| cell.printed)
 }
 
@@ -27,10 +27,10 @@ pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io:
 /// Address, size, access, name, unit, section, meaning; `R` and the mask of the bits that are read only.
 fn line(cell: &Cell, digits: usize) -> String {
     let access = match (cell.access, cell.read_only_bits) {
-        (Access::Reserved, _) => "reserved".to_owned(),
-        (Access::Read, _) => "read".to_owned(),
-        (Access::Write, 0) => "write".to_owned(),
-        (Access::Write, mask) => format!("write R{mask:02X}"),
+        (CellAccess::Reserved, _) => "reserved".to_owned(),
+        (CellAccess::Read, _) => "read".to_owned(),
+        (CellAccess::Write, 0) => "write".to_owned(),
+        (CellAccess::Write, mask) => format!("write R{mask:02X}"),
     };
     let unit = cell.scale.map_or("", |scale| scale.unit());
     format!(

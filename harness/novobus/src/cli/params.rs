@@ -15,7 +15,7 @@ use harness_bench::command::rig_name::Use;
 use harness_bench::counted::counted;
 use harness_bench::rig::state::utc;
 use harness_bench::scenario::source::Source;
-use harness_proto::nd21::cells::Access;
+use harness_proto::nd21::cells::CellAccess;
 use harness_proto::nd21::eeprom::eeprom_of;
 use harness_proto::nd21::units::{Date, DriveUnits};
 use harness_proto::nd21::{PARAMETERS, ee};
@@ -233,7 +233,9 @@ fn load(
 
 /// The section that calls a cell read only.
 fn read_only(location: &MemoryRange) -> Option<&'static str> {
-    let cell = location.cell().filter(|cell| cell.access == Access::Read)?;
+    let cell = location
+        .cell()
+        .filter(|cell| cell.access == CellAccess::Read)?;
     Some(cell.section)
 }
 

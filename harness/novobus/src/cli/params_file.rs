@@ -12,7 +12,7 @@ use crate::language::syntax::Written;
 use harness_bench::command::params::{checked, entries, place};
 use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
 use harness_bench::scenario::source::Source;
-use harness_proto::nd21::cells::{Access, Cell, RAM};
+use harness_proto::nd21::cells::{Cell, CellAccess, RAM};
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
@@ -26,8 +26,9 @@ const TABLE: &str = "nd21";
 pub(crate) fn parameters() -> Vec<MemoryRange> {
     let cells = LINKS.iter().flat_map(|link| {
         let linked = link.ram..link.ram + u16::from(link.size);
-        RAM.iter()
-            .filter(move |cell| linked.contains(&cell.address) && cell.access != Access::Reserved)
+        RAM.iter().filter(move |cell| {
+            linked.contains(&cell.address) && cell.access != CellAccess::Reserved
+        })
     });
     cells
         .map(|cell: &'static Cell| MemoryRange::of(MemoryKind::Ram, cell))
@@ -72,7 +73,7 @@ pub(crate) fn text(drive: &str, found: &[CellFound<'_>]) -> String {
         let section = cell.map_or("", |cell| cell.section);
         let meaning = cell.map_or("", |cell| cell.english);
         let fixed = match cell.map(|cell| cell.access) {
-            Some(Access::Read) => " (read only)",
+            Some(CellAccess::Read) => " (read only)",
             _ => "",
         };
         text.push_str(&format!(

@@ -6,7 +6,7 @@ use super::order::{CommandSent, RawCommand, Spoil};
 use crate::explore::{Spice, Swarm};
 use harness_bench::explore::Dice;
 use harness_proto::nd21::bits::status;
-use harness_proto::nd21::cells::{Access, RAM};
+use harness_proto::nd21::cells::{CellAccess, RAM};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::guard::{Limits, Need};
 
@@ -483,7 +483,7 @@ fn any_cell(dice: &mut Dice) -> u16 {
         5..8 => {
             let named: Vec<u16> = RAM
                 .iter()
-                .filter(|cell| cell.access != Access::Reserved)
+                .filter(|cell| cell.access != CellAccess::Reserved)
                 .map(|cell| cell.address)
                 .collect();
             dice.pick(&named).copied().unwrap_or(CELLS[0])

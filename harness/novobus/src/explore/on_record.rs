@@ -317,7 +317,7 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Received>, D::
 mod tests {
     use super::super::judge::{all_properties, prologue};
     use super::*;
-    use harness_proto::novobus::properties::{Properties, Setting};
+    use harness_proto::novobus::properties::{BusSetting, Properties};
 
     /// ND21 9.9: drives that monitor time-outs answer with zeros after a silence of the bench. Zeros after none, and other bytes, are a drive's
     /// fault.
@@ -367,7 +367,7 @@ mod tests {
         for (place, wanted) in (0u8..).zip(all_properties()) {
             let mut made = Properties::default();
             for (_, (name, word)) in (0..).zip(OPEN).filter(|(bit, _)| place & (8 >> bit) != 0) {
-                made.set(name, Setting::Word(word)).expect("a property");
+                made.set(name, BusSetting::Word(word)).expect("a property");
             }
             assert_eq!(made, wanted, "{place}");
         }

@@ -10,7 +10,7 @@ use harness_bench::scenario::parse::words::equals;
 use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
 use harness_bench::scenario::quantity::{self, Dimension};
 use harness_bench::scenario::scanner::Scanner;
-use harness_proto::nd21::cells::{Access, Cell};
+use harness_proto::nd21::cells::{Cell, CellAccess};
 use harness_proto::nd21::units::{self, Scale};
 
 /// Maximum number of bytes read from an address on.
@@ -91,7 +91,7 @@ impl MemoryRange {
     fn writable(&self) -> Result<(), Problem> {
         let name = self.name();
         let span = self.place.span;
-        if let Some(cell) = self.cell().filter(|cell| cell.access == Access::Read) {
+        if let Some(cell) = self.cell().filter(|cell| cell.access == CellAccess::Read) {
             let message = format!("`{name}` is read only (ND21 {})", cell.section);
             return Err(Problem::new(
                 span,

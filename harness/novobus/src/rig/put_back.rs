@@ -13,7 +13,7 @@ use harness_bench::link::{Line, Octets as _};
 use harness_bench::medium::Out;
 use harness_bench::rig::Ends;
 use harness_proto::nd21::bits::{flags2, status};
-use harness_proto::nd21::cells::{Access, Cell, RAM, cell_at};
+use harness_proto::nd21::cells::{Cell, CellAccess, RAM, cell_at};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{is_own, outputs_of_the_bus};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
@@ -72,7 +72,7 @@ pub(super) struct HeldValues {
 /// Whether a cell holds what a master sets, and the drive leaves it so. The safe state sets the nominal speed.
 fn is_setting(cell: &Cell) -> bool {
     let address = cell.address;
-    let free = cell.access == Access::Write && cell.size <= 2 && !is_own(address);
+    let free = cell.access == CellAccess::Write && cell.size <= 2 && !is_own(address);
     SETTINGS.contains(&address) || free && address != ram::NSOLL
 }
 

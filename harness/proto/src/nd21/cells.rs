@@ -4,7 +4,7 @@ use super::units::{DriveUnits, Scale, UnitError, Value};
 
 /// What a master may do with a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Access {
+pub enum CellAccess {
     /// The manual calls it a read only value or byte.
     Read,
     /// It can be read and written (14.2).
@@ -27,7 +27,7 @@ pub struct Cell {
     /// Whether the manual says two's complement; `false` where it is silent.
     pub signed: bool,
     /// What may be done with it.
-    pub access: Access,
+    pub access: CellAccess,
     /// The bits that its figure marks with R, for read only.
     pub read_only_bits: u8,
     /// Its scale, if the manual gives one.
@@ -81,7 +81,7 @@ macro_rules! cells {
             address: $address,
             size: $size,
             signed: $signed,
-            access: Access::$access,
+            access: CellAccess::$access,
             read_only_bits: 0 $(| $mask)?,
             scale: cells!(@scale $($scale)?),
             section: $section,

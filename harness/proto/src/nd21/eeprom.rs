@@ -1,6 +1,6 @@
 //! The EEPROM of the drive, cell by cell (ND21 14.2.2), and the RAM cells that are loaded from it.
 
-use super::cells::{Access, Cell, PLAIN, SIGNED, at, cells, named};
+use super::cells::{Cell, CellAccess, PLAIN, SIGNED, at, cells, named};
 use super::units::Scale;
 
 #[rustfmt::skip]
@@ -16,7 +16,7 @@ cells! {
 /// * `EE_Ablauf` holds the forty positions of 13.1.9, see
 ///   [`position::eeprom_address`](super::position::eeprom_address). 12.5 ends the EEPROM at 7F (E44).
 ///
-/// `EE_Seriennummer`, the hours and `EE_InitDatum` "can be read out" (14.8) and are [`Access::Read`];
+/// `EE_Seriennummer`, the hours and `EE_InitDatum` "can be read out" (14.8) and are [`CellAccess::Read`];
 /// Every program that changes the EEPROM must write `EE_ProgDatum` (14.8.4).
 table EEPROM;
 /// The addresses of the EEPROM cells (ND21 14.2.2).

@@ -4,7 +4,7 @@
 //! write is the drive's choice too, ROM and EEPROM included, but it must not change from one read to the next.
 
 use super::bits::{hw_version, hw_version2};
-use super::cells::{Access, cell_at, changes_by_itself};
+use super::cells::{CellAccess, cell_at, changes_by_itself};
 use super::io::{GPO1, GPO2, OUTPUTS};
 use super::{PARAMETERS, ram};
 use core::ops::RangeInclusive;
@@ -142,7 +142,7 @@ pub const fn outputs_of_the_bus(hardware: u8, hardware2: u8) -> u8 {
 #[must_use]
 pub fn is_own(address: u16) -> bool {
     OWN.iter().any(|range| range.cells.contains(&address))
-        || cell_at(address).is_some_and(|cell| cell.access != Access::Write)
+        || cell_at(address).is_some_and(|cell| cell.access != CellAccess::Write)
 }
 
 #[cfg(test)]
@@ -157,7 +157,7 @@ mod tests {
             let changes = changes_by_itself(address) && !SCOPE_BUFFER.contains(&address);
             assert!(!changes || is_own(address), "{address:04X}");
         }
-        let read_only = RAM.iter().filter(|cell| cell.access == Access::Read);
+        let read_only = RAM.iter().filter(|cell| cell.access == CellAccess::Read);
         assert!(
             read_only
                 .flat_map(super::super::cells::Cell::addresses)

@@ -439,7 +439,7 @@ impl Default for Properties {
 
 /// What a property accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Accepts {
+pub enum Choices {
     /// One of these words; the default comes first.
     Words(&'static [&'static str]),
     /// A whole number.
@@ -455,11 +455,11 @@ pub enum Accepts {
 
 /// A property as people see it.
 #[derive(Clone, Copy, Debug)]
-pub struct Description {
+pub struct NordacProperty {
     /// Its name in scenarios.
     pub name: &'static str,
     /// What it can be set to.
-    pub accepts: Accepts,
+    pub accepts: Choices,
     /// The section that leaves it open: of the NORDAC manual, its GSD, or the bus standard (EN).
     pub section: &'static str,
     /// What it decides.
@@ -467,7 +467,7 @@ pub struct Description {
     set: fn(&mut Properties, &str) -> bool,
 }
 
-impl Description {
+impl NordacProperty {
     /// The property with this name.
     #[must_use]
     pub fn of(name: &str) -> Option<&'static Self> {
@@ -485,7 +485,7 @@ impl Description {
 macro_rules! properties {
     ($($name:literal $field:ident: $type:ident $([$least:literal $default:literal $most:literal])? $section:literal $about:literal;)+) => {
         &[
-            $(Description {
+            $(NordacProperty {
                 name: $name,
                 accepts: properties!(@accepts $type $($least $default $most)?),
                 section: $section,
@@ -498,9 +498,9 @@ macro_rules! properties {
         ]
     };
     (@accepts Count $least:literal $default:literal $most:literal) => {
-        Accepts::Count { least: $least, default: $default, most: $most }
+        Choices::Count { least: $least, default: $default, most: $most }
     };
-    (@accepts $type:ident) => { Accepts::Words($type::WORDS) };
+    (@accepts $type:ident) => { Choices::Words($type::WORDS) };
     (@value $word:ident Count $least:literal $most:literal) => { count($word, $least, $most) };
     (@value $word:ident $type:ident) => { $type::from_word($word) };
 }
@@ -513,7 +513,7 @@ fn count(word: &str, least: u8, most: u8) -> Option<u8> {
 
 /// Every property.
 #[rustfmt::skip]
-pub const PROPERTIES: &[Description] = properties! {
+pub const PROPERTIES: &[NordacProperty] = properties! {
     "pzd-invalid" pzd_invalid: PzdInvalid "3.2.1" "what happens to the process words in force when a control word with bit 10 = 0 comes";
     "timeout-counts" timeout_counts: TimeoutCounts "2.5.1" "what restarts the bus time-out 1625";
     "watchdog-action" watchdog_action: WatchdogAction "2.6" "what the inverter does when the DP watchdog expires";

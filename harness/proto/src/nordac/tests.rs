@@ -2,7 +2,7 @@
 
 use super::parameter::{Flag, Limit, NoParameter};
 use super::pkw::Index;
-use super::properties::{Accepts, Description, PROPERTIES, SubindexBits};
+use super::properties::{Choices, NordacProperty, PROPERTIES, SubindexBits};
 use super::units::BadQuantity;
 use super::words::{STW, State, ZSW, set_bits, set_of};
 use super::*;
@@ -419,7 +419,7 @@ fn properties_take_their_values() {
     assert_eq!(PROPERTIES.len(), 48);
     for property in PROPERTIES {
         assert_eq!(
-            Description::of(property.name).map(|p| p.name),
+            NordacProperty::of(property.name).map(|p| p.name),
             Some(property.name)
         );
         let mut properties = Properties::default();
@@ -430,7 +430,7 @@ fn properties_take_their_values() {
         );
         let mut others = BTreeSet::new();
         match property.accepts {
-            Accepts::Words(words) => {
+            Choices::Words(words) => {
                 for word in words {
                     let mut now = Properties::default();
                     assert!(property.set(&mut now, word), "{}", property.name);
@@ -439,7 +439,7 @@ fn properties_take_their_values() {
                 }
                 assert!(others.len() == words.len() && words.len() > 1);
             }
-            Accepts::Count {
+            Choices::Count {
                 least,
                 default,
                 most,

@@ -31,8 +31,8 @@ impl Unit {
 
     /// A raw number as people read it.
     #[must_use]
-    pub const fn show(self, raw: i64) -> Shown {
-        Shown { unit: self, raw }
+    pub const fn show(self, raw: i64) -> RawWithUnit {
+        RawWithUnit { unit: self, raw }
     }
 
     /// The raw number of a text: `100` is raw; `5 s`, `5s`, `5.00s` are values; where the unit has no name, so is `0.80`.
@@ -100,12 +100,12 @@ impl fmt::Display for Unit {
 
 /// A raw number with its unit, shown as a value: `5.00 s`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shown {
+pub struct RawWithUnit {
     unit: Unit,
     raw: i64,
 }
 
-impl fmt::Display for Shown {
+impl fmt::Display for RawWithUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Unit { step, places, name } = self.unit;
         let all = i128::from(self.raw) * i128::from(step);
@@ -176,7 +176,7 @@ impl Parameter {
 
     /// A number as people read it.
     #[must_use]
-    pub fn show(&self, element: u16, number: i64) -> Shown {
+    pub fn show(&self, element: u16, number: i64) -> RawWithUnit {
         self.unit_of(element).show(number)
     }
 }

@@ -20,7 +20,7 @@ use crate::line::Received;
 use crate::nd21;
 use crate::time::Instant;
 
-pub use super::parameter_channel::Parameter;
+pub use super::parameter_channel::ParameterByte;
 pub use relay::{Passing, Relay};
 pub use view::{Remaining, Silent};
 
@@ -124,7 +124,7 @@ pub enum Place {
     /// The first byte of a command for this drive (9.5).
     Command,
     /// Another byte of it.
-    Parameter(Parameter),
+    Parameter(ParameterByte),
     /// Any byte: the drive is in the error mode (9.7).
     ErrorMode,
 }

@@ -30,7 +30,7 @@ struct Partial {
 
 /// The meaning of the next byte of an incomplete command, for observers of a bus end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parameter {
+pub struct ParameterByte {
     /// The command.
     pub kind: Kind,
     /// What the byte is.
@@ -57,10 +57,10 @@ pub(super) struct AnswerByte {
 impl ParameterChannel {
     /// What the next byte of the command under way is; `None` where none is.
     #[inline]
-    pub(super) fn next(&self) -> Option<Parameter> {
+    pub(super) fn next(&self) -> Option<ParameterByte> {
         let partial = self.partial.as_ref()?;
         let index = usize::from(partial.received);
-        Some(Parameter {
+        Some(ParameterByte {
             kind: partial.layout.kind,
             field: partial.layout.command[index],
             reply: partial.layout.answer[index],

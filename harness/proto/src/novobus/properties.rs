@@ -94,7 +94,7 @@ pub enum TimeOutAnswer {
 
 /// What a property can be set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Setting<'a> {
+pub enum BusSetting<'a> {
     /// One of the property's words.
     Word(&'a str),
     /// A time.
@@ -103,7 +103,7 @@ pub enum Setting<'a> {
 
 /// A property as people see it.
 #[derive(Clone, Copy, Debug)]
-pub struct Description {
+pub struct BusProperty {
     /// Its name in scenarios.
     pub name: &'static str,
     /// What it can be set to; the default comes first.
@@ -112,12 +112,12 @@ pub struct Description {
     pub section: &'static str,
     /// What it decides.
     pub about: &'static str,
-    set: fn(&mut Properties, Setting<'_>) -> bool,
+    set: fn(&mut Properties, BusSetting<'_>) -> bool,
 }
 
 /// Every property, with its values.
-pub const PROPERTIES: [Description; 7] = [
-    Description {
+pub const PROPERTIES: [BusProperty; 7] = [
+    BusProperty {
         name: "empty-short-telegram",
         values: &["accepted", "error"],
         section: "9.2",
@@ -133,7 +133,7 @@ pub const PROPERTIES: [Description; 7] = [
             )
         },
     },
-    Description {
+    BusProperty {
         name: "short-address",
         values: &["not-addressed", "kept-sum"],
         section: "9.2",
@@ -149,7 +149,7 @@ pub const PROPERTIES: [Description; 7] = [
             )
         },
     },
-    Description {
+    BusProperty {
         name: "read-long",
         values: &["four-data", "as-printed"],
         section: "10.1",
@@ -165,7 +165,7 @@ pub const PROPERTIES: [Description; 7] = [
             )
         },
     },
-    Description {
+    BusProperty {
         name: "broken-sequence",
         values: &["answered", "forwarded"],
         section: "9.8",
@@ -181,33 +181,33 @@ pub const PROPERTIES: [Description; 7] = [
             )
         },
     },
-    Description {
+    BusProperty {
         name: "time-out",
         values: &["10ms", "10ms..20ms"],
         section: "9.9",
         about: "silence after which a time-out is detected (monitoring on)",
         set: |p, s| match s {
-            Setting::Time(t) if (Span::from_millis(10)..=Span::from_millis(20)).contains(&t) => {
+            BusSetting::Time(t) if (Span::from_millis(10)..=Span::from_millis(20)).contains(&t) => {
                 p.time_out = t;
                 true
             }
             _ => false,
         },
     },
-    Description {
+    BusProperty {
         name: "time-out-wait",
         values: &["10ms", "0ms..100ms"],
         section: "9.9",
         about: "further silence before a drive sends zeros unasked",
         set: |p, s| match s {
-            Setting::Time(t) if t <= Span::from_millis(100) => {
+            BusSetting::Time(t) if t <= Span::from_millis(100) => {
                 p.time_out_wait = t;
                 true
             }
             _ => false,
         },
     },
-    Description {
+    BusProperty {
         name: "time-out-answer",
         values: &["answered", "silent"],
         section: "9.9",
@@ -225,8 +225,8 @@ pub const PROPERTIES: [Description; 7] = [
     },
 ];
 
-fn choose<T: Copy>(property: &mut T, setting: Setting<'_>, choices: &[(&str, T)]) -> bool {
-    let Setting::Word(word) = setting else {
+fn choose<T: Copy>(property: &mut T, setting: BusSetting<'_>, choices: &[(&str, T)]) -> bool {
+    let BusSetting::Word(word) = setting else {
         return false;
     };
     match choices.iter().find(|(name, _)| *name == word) {
@@ -243,7 +243,7 @@ impl Properties {
     ///
     /// # Errors
     /// What is wrong with the name or the value.
-    pub fn set(&mut self, name: &str, setting: Setting<'_>) -> Result<(), PropertyError> {
+    pub fn set(&mut self, name: &str, setting: BusSetting<'_>) -> Result<(), PropertyError> {
         let Some(description) = PROPERTIES.iter().find(|p| p.name == name) else {
             return Err(PropertyError::NoSuchProperty);
         };

@@ -7,7 +7,7 @@ use super::command::{Command, CommandError, LAYOUTS};
 use super::decode::Decoded;
 use super::error::BusError;
 use super::output::OutputChange;
-use super::properties::{PROPERTIES, Properties, ReadLongAnswer, Setting};
+use super::properties::{BusSetting, PROPERTIES, Properties, ReadLongAnswer};
 use super::sync::{Addressing, SyncByte, SyncError, TelegramHeader};
 use super::telegram::{Address, Telegram, TelegramError};
 use super::timing::{exchange_bytes, position_bytes};
@@ -372,8 +372,8 @@ fn properties_have_names() {
     for property in &PROPERTIES {
         let mut properties = Properties::default();
         let setting = match property.values[0] {
-            "10ms" => Setting::Time(Span::from_millis(10)),
-            word => Setting::Word(word),
+            "10ms" => BusSetting::Time(Span::from_millis(10)),
+            word => BusSetting::Word(word),
         };
         assert_eq!(
             properties.set(property.name, setting),
@@ -389,19 +389,19 @@ fn properties_have_names() {
         );
         assert!(
             properties
-                .set(property.name, Setting::Word("no-such-word"))
+                .set(property.name, BusSetting::Word("no-such-word"))
                 .is_err()
         );
     }
     let mut properties = Properties::default();
     assert!(
         properties
-            .set("time-out", Setting::Time(Span::from_millis(21)))
+            .set("time-out", BusSetting::Time(Span::from_millis(21)))
             .is_err()
     );
     assert!(
         properties
-            .set("no-such-property", Setting::Word("accepted"))
+            .set("no-such-property", BusSetting::Word("accepted"))
             .is_err()
     );
 }

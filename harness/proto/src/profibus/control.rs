@@ -7,13 +7,13 @@ pub struct FrameControl(pub u8);
 impl FrameControl {
     /// A request.
     #[must_use]
-    pub const fn request(function: Function, sequence: Sequence) -> Self {
+    pub const fn request(function: FcFunction, sequence: Sequence) -> Self {
         Self(0x40 | sequence.bits() | function.code())
     }
 
     /// A reply of a slave.
     #[must_use]
-    pub const fn reply(status: Status) -> Self {
+    pub const fn reply(status: FcStatus) -> Self {
         Self(status.code())
     }
 
@@ -37,9 +37,9 @@ impl FrameControl {
 
     /// The function of a request; `None` for a reply and for a code that no station knows.
     #[must_use]
-    pub fn function(self) -> Option<Function> {
+    pub fn function(self) -> Option<FcFunction> {
         let code = self.0 & 0x0F;
-        let known = Function::ALL
+        let known = FcFunction::ALL
             .into_iter()
             .find(|function| function.code() == code);
         known.filter(|_| self.is_request())
@@ -47,16 +47,18 @@ impl FrameControl {
 
     /// The status of a reply; `None` for a request and for a code that a DP slave does not send. Bits 5 and 4 (the kind of station) are not read.
     #[must_use]
-    pub fn status(self) -> Option<Status> {
+    pub fn status(self) -> Option<FcStatus> {
         let code = self.0 & 0x0F;
-        let known = Status::ALL.into_iter().find(|status| status.code() == code);
+        let known = FcStatus::ALL
+            .into_iter()
+            .find(|status| status.code() == code);
         known.filter(|_| !self.is_request())
     }
 }
 
 /// What a request asks for: bits 3 to 0 of its FC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Function {
+pub enum FcFunction {
     /// Send data with acknowledgement, low priority: 3.
     SdaLow,
     /// Send data without acknowledgement, low: 4.
@@ -77,7 +79,7 @@ pub enum Function {
     LsapStatus,
 }
 
-impl Function {
+impl FcFunction {
     /// Every function that stations know; a request with another one is not answered.
     pub const ALL: [Self; 9] = [
         Self::SdaLow,
@@ -138,7 +140,7 @@ impl Function {
 
 /// The status in a reply: bits 3 to 0 of its FC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Status {
+pub enum FcStatus {
     /// 00: OK.
     Ok,
     /// 03: no service activated (RS).
@@ -149,7 +151,7 @@ pub enum Status {
     DataHigh,
 }
 
-impl Status {
+impl FcStatus {
     /// Every status that a DP slave sends.
     pub const ALL: [Self; 4] = [Self::Ok, Self::Rs, Self::DataLow, Self::DataHigh];
 

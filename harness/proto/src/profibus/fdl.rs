@@ -6,7 +6,7 @@ use crate::decode::Decoded;
 use core::fmt;
 
 pub use super::buffer::Buffer;
-pub use super::control::{Fcb, FrameControl, Function, Sequence, Status};
+pub use super::control::{FcFunction, FcStatus, Fcb, FrameControl, Sequence};
 
 /// Start of a telegram without data.
 pub const SD1: u8 = 0x10;
@@ -237,7 +237,7 @@ pub enum Telegram {
 
 /// Why octets are no telegram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Reason {
+pub enum Malformed {
     /// The first octet starts no telegram.
     Start,
     /// LE is below 4 or above 249.
@@ -260,7 +260,7 @@ pub enum Reason {
     End,
 }
 
-impl Reason {
+impl Malformed {
     /// In words: completes "this is no telegram: ...".
     #[must_use]
     pub const fn about(self) -> &'static str {
@@ -279,7 +279,7 @@ impl Reason {
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.about())
     }
@@ -304,7 +304,7 @@ impl Telegram {
 
     /// The telegram at the begin of some octets. A reason is given at the first octet that settles it; octets after the telegram are not read.
     #[must_use]
-    pub fn decode(octets: &[u8]) -> Decoded<Self, Reason> {
+    pub fn decode(octets: &[u8]) -> Decoded<Self, Malformed> {
         let bad = |reason, offset| Decoded::Bad { reason, offset };
         match *octets {
             [] => Decoded::NeedMore,
@@ -322,13 +322,13 @@ impl Telegram {
             [SD2, ref head @ ..] => {
                 if let Some(length) = head.first() {
                     if !(4..=249).contains(length) {
-                        return bad(Reason::Length, 1);
+                        return bad(Malformed::Length, 1);
                     }
                     if head.get(1).is_some_and(|again| again != length) {
-                        return bad(Reason::LengthRepeated, 2);
+                        return bad(Malformed::LengthRepeated, 2);
                     }
                     if head.get(2).is_some_and(|start| *start != SD2) {
-                        return bad(Reason::StartRepeated, 3);
+                        return bad(Malformed::StartRepeated, 3);
                     }
                 }
                 match *head {
@@ -338,12 +338,17 @@ impl Telegram {
                     _ => Decoded::NeedMore,
                 }
             }
-            _ => bad(Reason::Start, 0),
+            _ => bad(Malformed::Start, 0),
         }
     }
 
     /// DA to ED, of which the first is octet `begin` of the telegram, with `length` octets behind FC.
-    fn decode_body(body: &[u8], begin: usize, length: usize, fixed: bool) -> Decoded<Self, Reason> {
+    fn decode_body(
+        body: &[u8],
+        begin: usize,
+        length: usize,
+        fixed: bool,
+    ) -> Decoded<Self, Malformed> {
         let bad = |reason, index: usize| Decoded::Bad {
             reason,
             offset: begin + index,
@@ -352,29 +357,29 @@ impl Telegram {
         // In the order of the octets, so that more octets never change the reason.
         let saps = usize::from(extended(0)) + usize::from(extended(1));
         if extended(0) && length == 0 {
-            return bad(Reason::SapMissing, 0);
+            return bad(Malformed::SapMissing, 0);
         }
         if body.get(1).is_some_and(|sa| sa & !EXTENSION == BROADCAST) {
-            return bad(Reason::Source, 1);
+            return bad(Malformed::Source, 1);
         }
         if saps > length {
-            return bad(Reason::SapMissing, 1);
+            return bad(Malformed::SapMissing, 1);
         }
         if extended(2) {
-            return bad(Reason::Control, 2);
+            return bad(Malformed::Control, 2);
         }
         for index in 3..3 + saps {
             if body.get(index).is_some_and(|sap| *sap > LAST_SAP) {
-                return bad(Reason::Sap, index);
+                return bad(Malformed::Sap, index);
             }
         }
         let end = 3 + length;
         let sum = body.get(..end).map(check_sum);
         if body.get(end).copied().is_some_and(|fcs| Some(fcs) != sum) {
-            return bad(Reason::CheckSum, end);
+            return bad(Malformed::CheckSum, end);
         }
         if body.get(end + 1).is_some_and(|last| *last != ED) {
-            return bad(Reason::End, end + 1);
+            return bad(Malformed::End, end + 1);
         }
         if body.len() < end + 2 {
             return Decoded::NeedMore;

@@ -4,7 +4,7 @@
 //! [takes](Requests::take) something or the slot time ends.
 
 use super::dp::{GlobalControl, Service};
-use super::fdl::{BROADCAST, BadTelegram, Function, LAST_ADDRESS, Sequence, Status};
+use super::fdl::{BROADCAST, BadTelegram, FcFunction, FcStatus, LAST_ADDRESS, Sequence};
 use super::{Buffer, Pdu, Telegram};
 use crate::profibus::fdl::FrameControl;
 
@@ -80,7 +80,7 @@ impl Requests {
     /// # Errors
     /// None for addresses that [`new`](Self::new) accepts.
     pub fn status(&mut self) -> Result<Pdu, BadTelegram> {
-        let control = FrameControl::request(Function::FdlStatus, Sequence::None);
+        let control = FrameControl::request(FcFunction::FdlStatus, Sequence::None);
         let pdu = Pdu::new(self.slave, self.master, control, &[])?;
         self.last = Some(pdu);
         Ok(pdu)
@@ -92,9 +92,9 @@ impl Requests {
     /// [`BadTelegram::Length`] for more data than a telegram holds.
     pub fn request(&mut self, service: Service, data: &[u8]) -> Result<Pdu, BadTelegram> {
         let function = match service {
-            Service::DataExchange => Function::SrdHigh,
-            Service::GlobalControl => Function::SdnLow,
-            _ => Function::SrdLow,
+            Service::DataExchange => FcFunction::SrdHigh,
+            Service::GlobalControl => FcFunction::SdnLow,
+            _ => FcFunction::SrdLow,
         };
         let sequence = match service {
             Service::GlobalControl => Sequence::None,
@@ -137,10 +137,10 @@ impl Requests {
             return None;
         }
         Some(match pdu.fc().status() {
-            Some(Status::Ok) if bare && pdu.data().is_empty() => SlaveReply::Present,
-            Some(Status::Rs) => SlaveReply::NotActivated,
-            Some(status @ (Status::DataLow | Status::DataHigh)) if saps => SlaveReply::Data {
-                diagnosis: status == Status::DataHigh,
+            Some(FcStatus::Ok) if bare && pdu.data().is_empty() => SlaveReply::Present,
+            Some(FcStatus::Rs) => SlaveReply::NotActivated,
+            Some(status @ (FcStatus::DataLow | FcStatus::DataHigh)) if saps => SlaveReply::Data {
+                diagnosis: status == FcStatus::DataHigh,
                 data: Buffer::of(pdu.data()).unwrap_or_default(),
             },
             _ => SlaveReply::Other(pdu.fc()),
@@ -153,7 +153,7 @@ impl Requests {
 /// # Errors
 /// [`BadTelegram::Address`] for a master above 126.
 pub fn command_all(master: u8, command: GlobalControl) -> Result<Pdu, BadTelegram> {
-    let control = FrameControl::request(Function::SdnLow, Sequence::None);
+    let control = FrameControl::request(FcFunction::SdnLow, Sequence::None);
     let service = Service::GlobalControl;
     let saps = (service.sap(), service.master_sap());
     Pdu::with_saps(

@@ -29,7 +29,7 @@ fn telegram(text: &str) -> Pdu {
     }
 }
 
-fn reason(text: &str) -> (Reason, usize) {
+fn reason(text: &str) -> (Malformed, usize) {
     match Telegram::decode(&octets(text)) {
         Decoded::Bad { reason, offset } => (reason, offset),
         other => panic!("{text}: {other:?}"),
@@ -59,15 +59,15 @@ fn rates() {
 fn telegrams_of_a_start() {
     let status = telegram("10 08 02 49 53 16");
     assert_eq!((status.da(), status.sa()), (8, 2));
-    assert_eq!(status.fc().function(), Some(Function::FdlStatus));
+    assert_eq!(status.fc().function(), Some(FcFunction::FdlStatus));
     let reply = telegram("10 02 08 00 0A 16");
-    assert_eq!(reply.fc().status(), Some(Status::Ok));
+    assert_eq!(reply.fc().status(), Some(FcStatus::Ok));
     let request = telegram("68 05 05 68 88 82 6C 3C 3E F0 16");
     assert_eq!((request.dsap(), request.ssap()), (Some(60), Some(62)));
     assert_eq!(Service::of(request.dsap()), Some(Service::SlaveDiag));
     assert_eq!(
         request.fc(),
-        FrameControl::request(Function::SrdLow, Sequence::First)
+        FrameControl::request(FcFunction::SrdLow, Sequence::First)
     );
     assert!(request.data().is_empty());
     let diagnosis = telegram("68 0B 0B 68 82 88 08 3E 3C 02 05 00 FF 75 31 38 16");
@@ -84,11 +84,11 @@ fn telegrams_of_a_start() {
     assert_eq!((cfg.fc().fcb(), cfg.fc().fcv()), (true, true));
     assert_eq!(cfg.data(), [0xF3, 0xF1]);
     let early = telegram("10 02 08 03 0D 16");
-    assert_eq!(early.fc().status(), Some(Status::Rs));
+    assert_eq!(early.fc().status(), Some(FcStatus::Rs));
     let built = Pdu::with_saps(
         8,
         2,
-        FrameControl::request(Function::SrdLow, Sequence::Counted(false)),
+        FrameControl::request(FcFunction::SrdLow, Sequence::Counted(false)),
         Some(61),
         Some(62),
         &SetPrm::lock(0x7531).encode().unwrap(),
@@ -108,20 +108,20 @@ fn telegrams_of_a_start() {
 #[test]
 fn reasons() {
     for (text, expected) in [
-        ("11", (Reason::Start, 0)),
-        ("68 03", (Reason::Length, 1)),
-        ("68 FA", (Reason::Length, 1)),
-        ("68 05 06", (Reason::LengthRepeated, 2)),
-        ("68 05 05 67", (Reason::StartRepeated, 3)),
-        ("10 08 7F", (Reason::Source, 2)),
-        ("10 08 02 C9", (Reason::Control, 3)),
-        ("10 88", (Reason::SapMissing, 1)),
-        ("10 08 82", (Reason::SapMissing, 2)),
-        ("68 04 04 68 88 82", (Reason::SapMissing, 5)),
-        ("68 05 05 68 88 82 6C 7C", (Reason::Sap, 7)),
-        ("68 05 05 68 88 82 6C 3C BE", (Reason::Sap, 8)),
-        ("10 08 02 49 54", (Reason::CheckSum, 4)),
-        ("10 08 02 49 53 17", (Reason::End, 5)),
+        ("11", (Malformed::Start, 0)),
+        ("68 03", (Malformed::Length, 1)),
+        ("68 FA", (Malformed::Length, 1)),
+        ("68 05 06", (Malformed::LengthRepeated, 2)),
+        ("68 05 05 67", (Malformed::StartRepeated, 3)),
+        ("10 08 7F", (Malformed::Source, 2)),
+        ("10 08 02 C9", (Malformed::Control, 3)),
+        ("10 88", (Malformed::SapMissing, 1)),
+        ("10 08 82", (Malformed::SapMissing, 2)),
+        ("68 04 04 68 88 82", (Malformed::SapMissing, 5)),
+        ("68 05 05 68 88 82 6C 7C", (Malformed::Sap, 7)),
+        ("68 05 05 68 88 82 6C 3C BE", (Malformed::Sap, 8)),
+        ("10 08 02 49 54", (Malformed::CheckSum, 4)),
+        ("10 08 02 49 53 17", (Malformed::End, 5)),
     ] {
         assert_eq!(reason(text), expected, "{text}");
     }
@@ -153,7 +153,7 @@ fn pdu_count_bits() {
     let mut fcb = Fcb::default();
     for expected in [0x6D, 0x5D, 0x7D, 0x5D, 0x7D] {
         sequence = sequence.next();
-        let control = FrameControl::request(Function::SrdHigh, sequence);
+        let control = FrameControl::request(FcFunction::SrdHigh, sequence);
         assert_eq!(control.0, expected);
         assert!(!fcb.repeats(2, control));
         // The first of a sequence is always new.
@@ -180,7 +180,7 @@ fn functions() {
     assert_eq!(known, [3, 4, 5, 6, 9, 12, 13, 14, 15]);
     assert_eq!(FrameControl(0x09).function(), None);
     assert_eq!(FrameControl(0x48).status(), None);
-    assert_eq!(FrameControl(0x2A).status(), Some(Status::DataHigh));
+    assert_eq!(FrameControl(0x2A).status(), Some(FcStatus::DataHigh));
 }
 
 /// EN 2: the configuration bytes of the GSD.

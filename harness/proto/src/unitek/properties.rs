@@ -330,7 +330,7 @@ pub enum Accepts {
 
 /// A property as people see it.
 #[derive(Clone, Copy, Debug)]
-pub struct Description {
+pub struct UnitekProperty {
     /// Its name in scenarios.
     pub name: &'static str,
     /// What it can be set to.
@@ -367,7 +367,7 @@ impl fmt::Display for CurrentSetting {
     }
 }
 
-impl Description {
+impl UnitekProperty {
     /// What the property is of a drive.
     #[must_use]
     pub fn of_drive(&self, properties: &Properties) -> CurrentSetting {
@@ -391,7 +391,7 @@ impl Description {
 macro_rules! properties {
     ($($name:literal $field:ident: $type:ident $section:literal $about:literal;)+) => {
         &[
-            $(Description {
+            $(UnitekProperty {
                 name: $name,
                 accepts: properties!(@accepts $type),
                 section: $section,
@@ -441,7 +441,7 @@ fn time(setting: Setting<'_>) -> Option<Span> {
 
 /// Every property.
 #[rustfmt::skip]
-pub const PROPERTIES: &[Description] = properties! {
+pub const PROPERTIES: &[UnitekProperty] = properties! {
     "map-reply" map_reply: MapReply "App 7" "the width of polled and cyclic replies with 40 and 8F";
     "event-reply" event_reply: EventReply "ex 10" "the width of 40 in an event frame";
     "stuff" stuff: Byte "App 2" "the last byte of every reply";

@@ -9,7 +9,7 @@ use harness_proto::nd21::bits::{flags, ps_status, status};
 use harness_proto::nd21::ram;
 
 /// What is looked at.
-pub(super) struct State<'a> {
+pub(super) struct CheckedState<'a> {
     pub(super) cells: &'a Cells,
     pub(super) mode: Mode,
     pub(super) positioning: &'a Positioning,
@@ -18,7 +18,7 @@ pub(super) struct State<'a> {
 }
 
 /// A sentence and whether it holds.
-type Invariant = (&'static str, fn(&State<'_>) -> bool);
+type Invariant = (&'static str, fn(&CheckedState<'_>) -> bool);
 
 const INVARIANTS: &[Invariant] = &[
     ("the rotor has a speed and a place", |s| {
@@ -96,7 +96,7 @@ impl InvariantWatch {
     }
 
     /// Checks the invariants after a cycle.
-    pub(super) fn look(&mut self, state: &State<'_>) {
+    pub(super) fn look(&mut self, state: &CheckedState<'_>) {
         if self.watching {
             self.broken = self.broken.or_else(|| broken(state));
         } else {
@@ -106,7 +106,7 @@ impl InvariantWatch {
 }
 
 /// The first invariant that does not hold.
-fn broken(state: &State<'_>) -> Option<&'static str> {
+fn broken(state: &CheckedState<'_>) -> Option<&'static str> {
     let (sentence, _) = INVARIANTS.iter().find(|(_, holds)| !holds(state))?;
     Some(sentence)
 }
@@ -120,7 +120,7 @@ mod tests {
     fn a_broken_invariant_is_kept() {
         let cells = Cells::with_eeprom([0; 256]);
         let positioning = Positioning::default();
-        let state = |speed, position| State {
+        let state = |speed, position| CheckedState {
             cells: &cells,
             mode: Mode::Stop,
             positioning: &positioning,

@@ -6,7 +6,7 @@
 use super::cycle_control::{CycleControl, Orders};
 use super::eeprom_controller::{EepromController, parity_is_right};
 use super::error_state;
-use super::invariants::{InvariantWatch, State};
+use super::invariants::{CheckedState, InvariantWatch};
 use super::monitor::{self, EndSwitches};
 use super::motion::{Demand, Motion, Outside};
 use super::outputs::{self, Encoder};
@@ -390,7 +390,7 @@ impl Program {
             && self.s_ramp.status() != Status::Doing
             && self.cycle_control.at_rest(&self.cells)
             && self.still_demands_nothing();
-        self.invariants.look(&State {
+        self.invariants.look(&CheckedState {
             cells: &self.cells,
             mode: self.mode,
             positioning: &self.positioning,

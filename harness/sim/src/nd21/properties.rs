@@ -3,7 +3,7 @@
 use super::plant::PlantParameters;
 use super::s_ramp::SRampWire;
 use harness_proto::nd21::units::DriveType;
-use harness_proto::novobus::properties::Setting;
+use harness_proto::novobus::properties::BusSetting;
 use harness_proto::time::Span;
 
 /// How an ND21 behaves where the manual does not say.
@@ -240,12 +240,12 @@ impl Property {
     }
 
     /// Sets it; false where it has no such value.
-    pub fn set(&self, properties: &mut Nd21Properties, setting: Setting<'_>) -> bool {
+    pub fn set(&self, properties: &mut Nd21Properties, setting: BusSetting<'_>) -> bool {
         match (self.values, setting) {
-            (Values::Time(longest, set), Setting::Time(time)) if time <= longest => {
+            (Values::Time(longest, set), BusSetting::Time(time)) if time <= longest => {
                 set(properties, time);
             }
-            (Values::Words(words), Setting::Word(word)) => {
+            (Values::Words(words), BusSetting::Word(word)) => {
                 let Some((_, set)) = words.iter().find(|(known, _)| *known == word) else {
                     return false;
                 };
@@ -259,7 +259,7 @@ impl Property {
 
 impl Nd21Properties {
     /// Sets the property `name`; false where there is none of this name or it has no such value.
-    pub fn set(&mut self, name: &str, setting: Setting<'_>) -> bool {
+    pub fn set(&mut self, name: &str, setting: BusSetting<'_>) -> bool {
         PROPERTIES
             .iter()
             .find(|property| property.name == name)

@@ -47,7 +47,7 @@ pub struct Outputs {
 
 /// The process words of a reply.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Inputs {
+pub struct InverterInputs {
     /// The status word.
     pub zsw: u16,
     /// The main actual value.

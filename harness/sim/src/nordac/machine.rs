@@ -5,11 +5,11 @@
 use harness_proto::nordac::words::{State, stw};
 
 /// The number of a transition in section 6 of the reading; the figure of 3.3 is lost, and its numbers with it.
-pub type Rule = u8;
+pub type TransitionNumber = u8;
 
 /// The transition that ends a state because the motor stands: rules 5, 10 and 12.
 #[must_use]
-pub const fn at_standstill(state: State, control: u16) -> Option<(Rule, State)> {
+pub const fn at_standstill(state: State, control: u16) -> Option<(TransitionNumber, State)> {
     match state {
         State::OperationEnabled if control & stw::ON == 0 => Some((5, State::ReadyToStart)),
         State::QuickStop => Some((10, State::StartDisable)),
@@ -28,7 +28,7 @@ pub const fn next(
     control: u16,
     standing: bool,
     off1_first: bool,
-) -> Option<(Rule, State)> {
+) -> Option<(TransitionNumber, State)> {
     let (on, voltage) = (control & stw::ON != 0, control & stw::NO_OFF2 != 0);
     let (no_quick_stop, enabled) = (control & stw::NO_OFF3 != 0, control & stw::ENABLE != 0);
     let valid = control & stw::VALID != 0;
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     /// The transitions that a word causes, with their numbers.
-    fn path(mut state: State, control: u16, standing: bool) -> (Vec<Rule>, State) {
+    fn path(mut state: State, control: u16, standing: bool) -> (Vec<TransitionNumber>, State) {
         let mut rules = Vec::new();
         while let Some((rule, new)) = next(state, control, standing, true) {
             rules.push(rule);
@@ -81,7 +81,7 @@ mod tests {
     fn every_transition_of_a_control_word() {
         use State::{FaultReaction, QuickStop, ReadyForOperation, StartDisable};
         use State::{OperationEnabled as Enabled, ReadyToStart as Ready};
-        let cases: [(State, u16, bool, &[Rule], State); 23] = [
+        let cases: [(State, u16, bool, &[TransitionNumber], State); 23] = [
             (StartDisable, 0x047E, true, &[2], Ready),
             (StartDisable, 0x047F, true, &[], StartDisable),
             (StartDisable, 0x007E, true, &[], StartDisable),

@@ -57,7 +57,7 @@ impl RingPlace {
 
 /// Bytes that were sent without a gap.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Run {
+struct ByteRun {
     start: Instant,
     count: usize,
     /// Whether they go back to bytes of the master's.
@@ -69,7 +69,7 @@ struct Run {
 struct LinkStream {
     bytes: Vec<u8>,
     /// When they are sent; no part of what the master hears.
-    runs: Vec<Run>,
+    runs: Vec<ByteRun>,
     /// Bytes that the master hears damaged, by their place.
     errors: Vec<(usize, LineError)>,
 }
@@ -86,7 +86,7 @@ impl LinkStream {
             let start = byte.at - byte_time;
             match last.filter(|run| free == Some(start) && run.solicited == byte.solicited()) {
                 Some(run) => run.count += 1,
-                None => carried.runs.push(Run {
+                None => carried.runs.push(ByteRun {
                     start,
                     count: 1,
                     solicited: byte.solicited(),
@@ -363,7 +363,7 @@ impl SharedRing {
     pub fn send(&mut self, before: &SharedState, bytes: &[u8]) -> Passage {
         let sent = LinkStream {
             bytes: bytes.to_vec(),
-            runs: vec![Run {
+            runs: vec![ByteRun {
                 start: before.now,
                 count: bytes.len(),
                 solicited: true,

@@ -10,7 +10,7 @@ mod write;
 use super::cycles::Cycles;
 use super::inputs::Inputs;
 use super::outbox::{Cause, Outbox, Waiting};
-use super::plant::{Control, Demand, Plant};
+use super::plant::{Control, Motor, PlantInputs};
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::bit_timing::Nbt;
@@ -49,7 +49,7 @@ pub struct Drive {
     /// Whether the drive uses the bit rate of the bus; with another one it neither hears nor sends.
     on_bus: bool,
     control: Control,
-    plant: Plant,
+    plant: Motor,
     /// Scans until homing ends.
     homing: Option<u64>,
     calibrated: bool,
@@ -89,7 +89,7 @@ impl Drive {
             bus: (BitRate::K500, Nbt::DEFAULT.0),
             on_bus: true,
             control: Control::Speed,
-            plant: Plant::new(POWER_UP_POSITION),
+            plant: Motor::new(POWER_UP_POSITION),
             homing: None,
             calibrated: false,
             timed_out: false,
@@ -193,7 +193,7 @@ impl Drive {
             PowerUpMode::Speed => Control::Speed,
             PowerUpMode::Position => Control::Position,
         };
-        self.plant = Plant::new(POWER_UP_POSITION);
+        self.plant = Motor::new(POWER_UP_POSITION);
         self.homing = None;
         self.calibrated = false;
         self.timed_out = false;
@@ -474,9 +474,9 @@ impl Drive {
         armed.then(|| self.last_frame + Span::from_millis(limit.into()))
     }
 
-    fn demand(&self) -> Demand {
+    fn demand(&self) -> PlantInputs {
         let signed = |number| self.cell16(number).cast_signed();
-        Demand {
+        PlantInputs {
             enabled: self.is_enabled(),
             control: self.control,
             speed: signed(0x31),

@@ -26,7 +26,7 @@ pub enum Control {
 
 /// What the registers say to the plant in one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Demand {
+pub struct PlantInputs {
     /// Whether the drive is enabled.
     pub enabled: bool,
     /// What it controls.
@@ -53,7 +53,7 @@ pub struct Demand {
     pub limit_minus: bool,
 }
 
-impl Demand {
+impl PlantInputs {
     fn most(&self) -> i64 {
         i64::from(self.limit).abs()
     }
@@ -71,7 +71,7 @@ impl Demand {
 
 /// The motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Plant {
+pub struct Motor {
     speed: i64,
     position: i32,
     /// What the ramps have not yet used; one for all of them.
@@ -81,7 +81,7 @@ pub struct Plant {
     position_rest: i64,
 }
 
-impl Plant {
+impl Motor {
     /// A motor that stands.
     #[must_use]
     pub const fn new(position: i32) -> Self {
@@ -129,7 +129,7 @@ impl Plant {
     }
 
     /// One millisecond. While homing, the axis stands.
-    pub fn step(&mut self, demand: &Demand, homing: bool) {
+    pub fn step(&mut self, demand: &PlantInputs, homing: bool) {
         match (demand.enabled, demand.control) {
             (false, _) => self.approach(0, 0, COASTING),
             (true, Control::Position) => {
@@ -144,7 +144,7 @@ impl Plant {
 
     /// Whether the next steps change nothing but the position, by a constant speed.
     #[must_use]
-    pub fn is_settled(&self, demand: &Demand, homing: bool) -> bool {
+    pub fn is_settled(&self, demand: &PlantInputs, homing: bool) -> bool {
         if homing {
             return false;
         }
@@ -158,8 +158,8 @@ impl Plant {
         }
     }
 
-    /// `millis` steps at once; only right while [`Plant::is_settled`].
-    pub fn skip(&mut self, demand: &Demand, millis: u64) {
+    /// `millis` steps at once; only right while [`Motor::is_settled`].
+    pub fn skip(&mut self, demand: &PlantInputs, millis: u64) {
         let moves = !(demand.enabled && demand.control == Control::Position);
         if moves && self.speed != 0 && millis > 0 {
             self.turn(demand.rpm_max, millis);
@@ -167,7 +167,7 @@ impl Plant {
     }
 
     /// Speed control.
-    fn follow(&mut self, demand: &Demand) {
+    fn follow(&mut self, demand: &PlantInputs) {
         let target = target(demand);
         if demand.forbids(self.speed) {
             return self.approach(0, target, demand.limit_ramp.into());
@@ -204,7 +204,7 @@ impl Plant {
     }
 
     /// Torque control: no load, no friction.
-    fn push(&mut self, demand: &Demand) {
+    fn push(&mut self, demand: &PlantInputs) {
         let sum = self.torque_rest + i64::from(demand.torque) * FULL;
         self.torque_rest = sum.rem_euclid(TORQUE_TIME);
         let most = demand.most();
@@ -212,7 +212,7 @@ impl Plant {
     }
 
     /// Position control.
-    fn travel(&mut self, demand: &Demand, homing: bool) {
+    fn travel(&mut self, demand: &PlantInputs, homing: bool) {
         let step = if homing {
             0
         } else {
@@ -229,7 +229,7 @@ impl Plant {
     }
 
     /// The counts of the next step towards the destination, at most `most`.
-    fn way(&self, demand: &Demand, most: i64) -> i64 {
+    fn way(&self, demand: &PlantInputs, most: i64) -> i64 {
         let away = i64::from(demand.destination) - i64::from(self.position);
         if demand.forbids(away) {
             return 0;
@@ -249,7 +249,7 @@ impl Plant {
 }
 
 /// 31 within the limit, and 0 where a limit switch forbids its direction.
-fn target(demand: &Demand) -> i64 {
+fn target(demand: &PlantInputs) -> i64 {
     let most = demand.most();
     let target = i64::from(demand.speed).clamp(-most, most);
     if demand.forbids(target) { 0 } else { target }

@@ -6,7 +6,7 @@ use harness_bench::campaign::line::{Conversation, MasterPiece};
 use harness_bench::counted::counted;
 use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Options, Outcome};
+use harness_proto::unitek::master::{CanMaster, Disturbance, Job, MasterEvent, Options, Outcome};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::segment::{Host, Placed, Segment};
@@ -97,7 +97,7 @@ pub(super) fn converse(frames: &Frames, fault: Option<Placed>) -> Conversation<F
 
 struct Desk {
     segment: Segment<Member<Box<Drive>>>,
-    master: Master,
+    master: CanMaster,
     now: Instant,
     sent: u64,
     disturbances: Vec<String>,
@@ -114,7 +114,7 @@ impl Desk {
         ];
         Self {
             segment: Segment::new(BitRate::K500, stations),
-            master: Master::new(DEFAULT_RX, DEFAULT_TX, options),
+            master: CanMaster::new(DEFAULT_RX, DEFAULT_TX, options),
             now: Instant::START,
             sent: 0,
             disturbances: Vec::new(),
@@ -188,9 +188,9 @@ impl Desk {
         self.transmit();
         while let Some(event) = self.master.poll_event() {
             match event {
-                Event::Ended { outcome, .. } => self.ended = Some(outcome),
-                Event::Disturbance(disturbance) => self.disturbances.push(words(disturbance)),
-                Event::Cyclic { .. } | Event::Status { .. } => {}
+                MasterEvent::Ended { outcome, .. } => self.ended = Some(outcome),
+                MasterEvent::Disturbance(disturbance) => self.disturbances.push(words(disturbance)),
+                MasterEvent::Cyclic { .. } | MasterEvent::Status { .. } => {}
             }
         }
     }

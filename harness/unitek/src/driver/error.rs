@@ -5,7 +5,7 @@ use harness_bench::counted::counted;
 use harness_bench::link::Trouble;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::{Data, Reply};
-use harness_proto::unitek::master::{Outcome, Refused};
+use harness_proto::unitek::master::{JobRefusal, Outcome};
 
 /// Why a call to a drive came to nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -51,7 +51,7 @@ pub(crate) enum Error {
     )]
     TimeOutStays { node: u8 },
     #[error("{0}")]
-    Refused(Refused),
+    Refused(JobRefusal),
     #[error("the bench has no drive {0}")]
     NoSuchDrive(u8),
     #[error("{0}")]

@@ -1,6 +1,6 @@
 //! Typed calls to UNITEK drives: requests with a time-out, writes that are read back, cycles, start-up and lock.
 //!
-//! It runs one sans-IO [`Master`] a drive over a [`Line`]. A call blocks until its result is there. It returns early when the line is in
+//! It runs one sans-IO [`CanMaster`] a drive over a [`Line`]. A call blocks until its result is there. It returns early when the line is in
 //! trouble.
 
 mod error;
@@ -13,7 +13,7 @@ use harness_bench::medium::{HeardPiece, Out};
 use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
-use harness_proto::unitek::master::{Event, Job, JobId, Master, Options, Outcome};
+use harness_proto::unitek::master::{CanMaster, Job, JobNumber, MasterEvent, Options, Outcome};
 use harness_proto::unitek::words::MODE_LOCK;
 use std::collections::VecDeque;
 use std::fmt;
@@ -50,15 +50,15 @@ pub(crate) enum StopKind {
 pub(crate) struct Driver<'l> {
     line: Box<dyn Line + 'l>,
     drives: Vec<Drive>,
-    events: VecDeque<(Instant, Axis, Event)>,
+    events: VecDeque<(Instant, Axis, MasterEvent)>,
     /// How long a drive may be silent that was asked as often as a request is repeated.
     silence: Span,
 }
 
 struct Drive {
     axis: Axis,
-    master: Master,
-    ended: Vec<(JobId, Outcome)>,
+    master: CanMaster,
+    ended: Vec<(JobNumber, Outcome)>,
 }
 
 impl fmt::Debug for Driver<'_> {
@@ -80,7 +80,7 @@ impl<'l> Driver<'l> {
         };
         let drive = |&axis: &Axis| Drive {
             axis,
-            master: Master::new(axis.rx, axis.tx, options),
+            master: CanMaster::new(axis.rx, axis.tx, options),
             ended: Vec::new(),
         };
         Self {
@@ -224,7 +224,7 @@ impl<'l> Driver<'l> {
 
     /// Cyclic frames, events and disturbances that were received since the last call, with their times.
     #[cfg(test)]
-    pub(crate) fn events(&mut self) -> impl Iterator<Item = (Instant, Axis, Event)> {
+    pub(crate) fn events(&mut self) -> impl Iterator<Item = (Instant, Axis, MasterEvent)> {
         self.events.drain(..)
     }
 
@@ -361,7 +361,7 @@ impl<'l> Driver<'l> {
         for drive in &mut self.drives {
             while let Some(event) = drive.master.poll_event() {
                 match event {
-                    Event::Ended { id, outcome } => drive.ended.push((id, outcome)),
+                    MasterEvent::Ended { id, outcome } => drive.ended.push((id, outcome)),
                     event if self.events.len() < MOST_EVENTS => {
                         self.events.push_back((now, drive.axis, event));
                     }

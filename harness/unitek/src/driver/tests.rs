@@ -144,7 +144,7 @@ fn cycles_come_as_events() {
     assert!((9..=11).contains(&came.len()), "{came:?}");
     assert!(
         came.iter()
-            .all(|(_, of, event)| *of == axis(1) && matches!(event, Event::Cyclic { .. }))
+            .all(|(_, of, event)| *of == axis(1) && matches!(event, MasterEvent::Cyclic { .. }))
     );
     driver.stop_every(axis(1), 0x30).expect("stopped");
     driver.run(Span::from_millis(30)).expect("time passes");

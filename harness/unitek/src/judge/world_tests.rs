@@ -82,12 +82,13 @@ fn undisturbed() -> Vec<Source> {
 /// UNITEK 7: with every value of an open point, and frames that are up to 10 ms late.
 #[test]
 fn no_right_drive_is_accused_however_late_its_frames_are() {
-    let words = |property: &'static harness_proto::unitek::properties::Description| match property
-        .accepts
-    {
-        Accepts::Words(words) => words.to_vec(),
-        Accepts::Byte | Accepts::TimeUpTo(_) => Vec::new(),
-    };
+    let words =
+        |property: &'static harness_proto::unitek::properties::UnitekProperty| match property
+            .accepts
+        {
+            Accepts::Words(words) => words.to_vec(),
+            Accepts::Byte | Accepts::TimeUpTo(_) => Vec::new(),
+        };
     let lines = PROPERTIES.iter().flat_map(|property| {
         let words = words(property).into_iter();
         words.map(move |word| format!("property {} = {word}", property.name))

@@ -14,11 +14,11 @@ use harness_bench::scenario::run::outcome::{Mismatch, Stop};
 use harness_bench::scenario::run::player::Runner;
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Event, Job, JobId, Options, Outcome};
+use harness_proto::unitek::master::{Job, JobNumber, MasterEvent, Options, Outcome};
 use harness_proto::unitek::units::{Scaling, shown, usual};
 use harness_proto::unitek::{Data, Register, Reply, Request};
 use harness_sim::unitek;
-use harness_sim::unitek::deviation::{DeviantMaster, MasterDeviation};
+use harness_sim::unitek::deviation::{DeviantCanMaster, MasterDeviation};
 use std::collections::BTreeMap;
 
 /// The longest job of the driver.
@@ -38,8 +38,8 @@ pub(crate) struct PlayState {
 
 #[derive(Debug)]
 struct PlayedMaster {
-    master: DeviantMaster,
-    ended: Vec<(JobId, Outcome)>,
+    master: DeviantCanMaster,
+    ended: Vec<(JobNumber, Outcome)>,
 }
 
 impl PlayedMaster {
@@ -48,10 +48,10 @@ impl PlayedMaster {
         let mut others = false;
         while let Some(event) = self.master.poll_event() {
             match event {
-                Event::Ended { id, outcome } => self.ended.push((id, outcome)),
-                Event::Cyclic { .. } | Event::Status { .. } | Event::Disturbance(_) => {
-                    others = true
-                }
+                MasterEvent::Ended { id, outcome } => self.ended.push((id, outcome)),
+                MasterEvent::Cyclic { .. }
+                | MasterEvent::Status { .. }
+                | MasterEvent::Disturbance(_) => others = true,
             }
         }
         others
@@ -350,7 +350,7 @@ fn drive(
     let deviation = runner.own.deviation;
     let driver = runner.own.drivers.entry(node);
     let driver = driver.or_insert_with(|| PlayedMaster {
-        master: DeviantMaster::new(rx, tx, Options::default(), deviation),
+        master: DeviantCanMaster::new(rx, tx, Options::default(), deviation),
         ended: Vec::new(),
     });
     let id = driver

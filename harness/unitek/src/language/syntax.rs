@@ -6,7 +6,7 @@ use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::times::Duration;
 use harness_proto::can::{BitRate, Id};
 use harness_proto::unitek::Register;
-use harness_proto::unitek::properties::Description;
+use harness_proto::unitek::properties::UnitekProperty;
 use harness_proto::unitek::units::{Decimal, Given};
 use harness_sim::unitek::Control;
 use harness_sim::unitek::deviation::{Deviation, MasterDeviation};
@@ -41,7 +41,7 @@ pub(crate) enum SetupKind {
     /// `profile fw472`.
     Profile(&'static str),
     /// `property map-reply = native`.
-    Property(&'static Description, PropertyValue),
+    Property(&'static UnitekProperty, PropertyValue),
     /// `mode position`.
     Mode(Control),
     /// `deviates NAME`.

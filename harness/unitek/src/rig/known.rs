@@ -5,7 +5,7 @@ use crate::driver::{Driver, Error};
 use crate::simulate::DriveSetup;
 use harness_proto::time::Span;
 use harness_proto::unitek::frame::Reply;
-use harness_proto::unitek::properties::{Description, PROPERTIES, Properties, Setting};
+use harness_proto::unitek::properties::{PROPERTIES, Properties, Setting, UnitekProperty};
 use harness_proto::unitek::words::{ERROR_NO_POWER, ERROR_TIME_OUT, status};
 use harness_proto::unitek::{REGISTERS, Register};
 use harness_sim::unitek::{Control, Inputs};
@@ -140,7 +140,7 @@ impl KnownDrives {
     }
 
     pub(super) fn settle(&mut self, name: &str, word: &str) {
-        if let Some(property) = Description::of(name)
+        if let Some(property) = UnitekProperty::of(name)
             && property.set(&mut self.properties, Setting::Word(word))
         {
             self.settled.insert(property.name);
@@ -202,7 +202,7 @@ impl KnownDrives {
 
     /// What the drive can be where one of its properties is open; the value that is assumed first. None for a property that can have any
     /// value.
-    pub(super) fn values_of(&self, property: &Description) -> Vec<Properties> {
+    pub(super) fn values_of(&self, property: &UnitekProperty) -> Vec<Properties> {
         use harness_proto::unitek::properties::Accepts;
         let Accepts::Words(words) = property.accepts else {
             return Vec::new();
@@ -239,7 +239,7 @@ impl KnownDrives {
 }
 
 /// The values that a property can have.
-fn values(property: &Description, reply_delay: Option<Span>) -> (Vec<&'static str>, Vec<Span>) {
+fn values(property: &UnitekProperty, reply_delay: Option<Span>) -> (Vec<&'static str>, Vec<Span>) {
     use harness_proto::unitek::properties::Accepts;
     match property.accepts {
         Accepts::Words(words) => (words.to_vec(), Vec::new()),

@@ -12,11 +12,11 @@ use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_proto::can::BitRate;
-use harness_proto::unitek::properties::{Accepts, Description, Setting};
+use harness_proto::unitek::properties::{Accepts, Setting, UnitekProperty};
 
 /// The properties of drives that a profile says: the number of the drive, the property and its value.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ProfileSettings(Vec<(u8, &'static Description, PropertyValue)>);
+pub(super) struct ProfileSettings(Vec<(u8, &'static UnitekProperty, PropertyValue)>);
 
 impl ProfileSettings {
     /// The settings of a rig's profile; empty where its file names none.

@@ -13,7 +13,7 @@ use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
 use harness_proto::unitek::guard::Limits;
-use harness_proto::unitek::properties::{Description, PROPERTIES};
+use harness_proto::unitek::properties::{PROPERTIES, UnitekProperty};
 use include_dir::{Dir, include_dir};
 use std::ops::RangeInclusive;
 
@@ -86,7 +86,7 @@ const NEEDS: [(&str, Need, &str); 14] = [
     ("second-identifiers", Need::BusSettingsAndPowerUp, ""),
 ];
 
-fn why_open(property: &Description, limits: &Limits) -> String {
+fn why_open(property: &UnitekProperty, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
     let why = match needs.map_or(Need::Nothing, |(_, needs, _)| *needs) {
         Need::Motion | Need::MotionAndBusSettings if !limits.motion => {
@@ -225,7 +225,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
 fn settle(drives: &mut [KnownDrives], place: usize, notes: &[&DriveNote]) {
     let drive = &mut drives[place];
     for (name, _, conversation) in NEEDS {
-        let property = Description::of(name).filter(|_| !drive.settled.contains(name));
+        let property = UnitekProperty::of(name).filter(|_| !drive.settled.contains(name));
         let Some(property) = property else { continue };
         let values = drive.values_of(property);
         let shown = format!("{CONVERSATION}{conversation}");
@@ -287,7 +287,7 @@ mod tests {
     #[test]
     fn every_need_is_of_a_property_and_its_conversation_is_there() {
         for (name, _, shown) in NEEDS {
-            assert!(Description::of(name).is_some(), "{name}");
+            assert!(UnitekProperty::of(name).is_some(), "{name}");
             let file = format!("{shown}.scn");
             assert!(shown.is_empty() || CONVERSATIONS.contains(file), "{name}");
         }

@@ -19,7 +19,7 @@ use harness_bench::rig::session::{
 use harness_bench::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
-use harness_proto::unitek::guard::Gate;
+use harness_proto::unitek::guard::FrameGate;
 
 /// Which firmware a drive has: the register that every drive is asked for at first.
 const FIRMWARE: u8 = 0x1B;
@@ -168,7 +168,7 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
 
 /// Whether a highest speed needs to know what drives hold.
 fn needs_speeds(session: &Session) -> bool {
-    let limits = session.guarded().segment().map(Gate::limits);
+    let limits = session.guarded().segment().map(FrameGate::limits);
     limits.is_some_and(|limits| limits.motion && limits.max_speed.is_some())
 }
 

@@ -9,7 +9,7 @@ use harness_bench::qualify::walk::{Walk, WalkBounds, WalkModel, WalkPart, walk};
 use harness_proto::can::{BadFrame, BitRate, Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Request};
-use harness_proto::unitek::guard::{Denial, Gate, Limits};
+use harness_proto::unitek::guard::{Denial, FrameGate, Limits};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::words::MODE_EVENT;
 use harness_sim::unitek::{Drive, Inputs};
@@ -200,7 +200,7 @@ pub(super) struct State {
 #[derive(Clone)]
 struct Model {
     drive: Drive,
-    gate: Gate,
+    gate: FrameGate,
     axis: Axis,
     now: Instant,
     inputs: Arc<[Input]>,
@@ -213,7 +213,7 @@ impl Model {
         let registers = [(0x68, axis.rx.into()), (0x69, axis.tx.into())];
         let drive = Drive::new(Properties::default(), Inputs::default(), Instant::START);
         let drive = drive.with_setup(&registers);
-        let mut gate = Gate::new(limits.clone(), BitRate::K500, &[(axis.rx, axis.tx)]);
+        let mut gate = FrameGate::new(limits.clone(), BitRate::K500, &[(axis.rx, axis.tx)]);
         let low = |number: usize| (drive.held()[number] & 0xFFFF) as u16;
         gate.learn(axis.rx, low(0xC8), low(0x34));
         Self {

@@ -8,7 +8,7 @@ use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::Properties;
-use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
+use harness_proto::nordac::properties::{Choices, NordacProperty, PROPERTIES};
 use harness_sim::nordac::deviation::DEVIATIONS;
 
 pub(super) enum ParsedSlaveLine {
@@ -132,7 +132,7 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     // Some names begin with the number of a parameter.
     let name = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
     let name = name.map_or("", |name| name.value);
-    let Some(property) = Description::of(name) else {
+    let Some(property) = NordacProperty::of(name) else {
         *scanner = before;
         let known: Vec<_> = PROPERTIES.iter().map(|property| property.name).collect();
         let problem = scanner.unexpected("a property, such as pzd-invalid");
@@ -147,11 +147,11 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     }
     *scanner = before;
     Err(match property.accepts {
-        Accepts::Words(words) => {
+        Choices::Words(words) => {
             let problem = scanner.unexpected(&words.join(" or "));
             problem.did_you_mean(word, words)
         }
-        Accepts::Count { least, most, .. } => {
+        Choices::Count { least, most, .. } => {
             scanner.unexpected(&format!("a number from {least} to {most}"))
         }
     })

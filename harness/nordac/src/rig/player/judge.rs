@@ -14,7 +14,7 @@ use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::run::outcome::{Mismatch, Unready};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::decode::Decoded;
-use harness_proto::nordac::properties::{Description, PROPERTIES};
+use harness_proto::nordac::properties::{NordacProperty, PROPERTIES};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
@@ -221,7 +221,7 @@ impl Player {
                     .collect()
             })
             .collect();
-        let may = |place: usize, property: &Description| {
+        let may = |place: usize, property: &NordacProperty| {
             open[place].iter().any(|point| point.name == property.name)
         };
         let came = |all: &Assumptions| -> ReceivedOctets {

@@ -15,7 +15,7 @@ use harness_bench::qualify::segment::{AttemptSummary, Note};
 use harness_bench::scenario::run::{Outcome, Why};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Description, PROPERTIES};
+use harness_proto::nordac::properties::{NordacProperty, PROPERTIES};
 use harness_proto::nordac::words::zsw;
 use harness_proto::nordac::{Image, Parameter, PpoType};
 use harness_proto::profibus::dp::Service;
@@ -163,7 +163,7 @@ impl SlaveNote {
         &self,
         known: &[KnownInverters],
         place: usize,
-        property: &Description,
+        property: &NordacProperty,
     ) -> Vec<String> {
         let base: Assumptions = known.iter().map(|known| known.properties).collect();
         let none = Values::new();
@@ -246,7 +246,7 @@ impl SlaveNote {
                 open.map(|row| row.name).collect()
             })
             .collect();
-        let may = |place: usize, property: &Description| open[place].contains(&property.name);
+        let may = |place: usize, property: &NordacProperty| open[place].contains(&property.name);
         let found = search(&base, may, |all| {
             self.shown_by(other, all, held).agrees(&self.shown)
         });

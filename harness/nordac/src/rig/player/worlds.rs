@@ -12,7 +12,7 @@ use crate::rig::settle::{Assumptions, search};
 use crate::simulate::SlaveSetup;
 use harness_bench::qualify::worlds::{Dialogue, RightDrive as _, TimedPiece, WorldsVerdict, lost};
 use harness_bench::rig::playing::observed::Beats;
-use harness_proto::nordac::properties::Description;
+use harness_proto::nordac::properties::NordacProperty;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::{Instant, Span};
 use line::{Line, Piece, narrow, pieces, telegram};
@@ -73,7 +73,7 @@ pub(super) fn right_slaves_send(
     if first.is_ok() {
         return first;
     }
-    let may = |place: usize, property: &Description| !known[place].is_settled(property);
+    let may = |place: usize, property: &NordacProperty| !known[place].is_settled(property);
     // Many slaves say the same, and what one of them explains all of them do.
     let mut explained: HashMap<Vec<(usize, Piece)>, Agreement> = HashMap::new();
     let found = search(&base, may, |all| {

@@ -14,7 +14,7 @@ use harness_bench::scenario::syntax::{Action, Scenario};
 use harness_proto::nd21;
 use harness_proto::nd21::units::{self, DriveType, Scale, SpeedRange, Value};
 use harness_proto::novobus::memory;
-use harness_proto::novobus::properties::{Properties, Setting};
+use harness_proto::novobus::properties::{BusSetting, Properties};
 use harness_sim::nd21::{Nd21Properties, PROPERTIES};
 use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
@@ -80,12 +80,12 @@ impl Planner {
             SetupKind::Type(device) => PlannedSetupKind::Type(*device),
             SetupKind::Influence(influence) => PlannedSetupKind::Influence(influence.clone()),
             SetupKind::Word(name, word) => {
-                set_property(&name.value, Setting::Word(&word.value), word.span)?;
+                set_property(&name.value, BusSetting::Word(&word.value), word.span)?;
                 PlannedSetupKind::Word(name.value.clone(), word.value.clone())
             }
             SetupKind::Time(name, duration) => {
                 let span = duration.on(self.byte_time());
-                set_property(&name.value, Setting::Time(span), duration.span())?;
+                set_property(&name.value, BusSetting::Time(span), duration.span())?;
                 PlannedSetupKind::Time(name.value.clone(), span)
             }
             SetupKind::Deviates(deviation) => PlannedSetupKind::Deviates(deviation),
@@ -319,7 +319,7 @@ pub(crate) fn in_memory(place: &CellPlace, length: usize) -> Result<(), Problem>
     ))
 }
 
-fn set_property(name: &str, setting: Setting<'_>, span: TextSpan) -> Result<(), Problem> {
+fn set_property(name: &str, setting: BusSetting<'_>, span: TextSpan) -> Result<(), Problem> {
     if let Some(property) = PROPERTIES.iter().find(|property| property.name == name) {
         if property.set(&mut Nd21Properties::default(), setting) {
             return Ok(());

@@ -14,7 +14,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
-use harness_proto::novobus::properties::{Properties, Setting};
+use harness_proto::novobus::properties::{BusSetting, Properties};
 use harness_proto::time::Span;
 use harness_sim::nd21::Nd21Properties;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
@@ -67,8 +67,8 @@ impl PlannedSetupKind {
     pub(crate) fn apply_to(&self, properties: &mut Properties) {
         // Planning has refused what cannot be set.
         let _known = match self {
-            Self::Word(name, word) => properties.set(name, Setting::Word(word)),
-            Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
+            Self::Word(name, word) => properties.set(name, BusSetting::Word(word)),
+            Self::Time(name, span) => properties.set(name, BusSetting::Time(*span)),
             _ => Ok(()),
         };
     }
@@ -93,10 +93,10 @@ impl PlannedSetupKind {
         match self {
             // Planning has refused what cannot be set; the bus's own properties are not found here.
             Self::Word(name, word) => {
-                let _own = properties.set(name, Setting::Word(word));
+                let _own = properties.set(name, BusSetting::Word(word));
             }
             Self::Time(name, span) => {
-                let _own = properties.set(name, Setting::Time(*span));
+                let _own = properties.set(name, BusSetting::Time(*span));
             }
             Self::Type(device) => properties.device = *device,
             _ => {}

@@ -5,12 +5,12 @@ use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::nd21::io::OUTPUTS;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::bus_end::{Parameter, Place};
+use harness_proto::novobus::bus_end::{ParameterByte, Place};
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::{Command, Field, Kind};
 use harness_proto::novobus::guard::{Guard, Limits};
 use harness_proto::novobus::memory::Memory as _;
-use harness_proto::novobus::properties::{PROPERTIES, Properties, Setting};
+use harness_proto::novobus::properties::{BusSetting, PROPERTIES, Properties};
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::device::Device as _;
 use harness_sim::novobus::plain::PlainDrive;
@@ -231,7 +231,10 @@ impl Model {
             for word in property.values.iter().skip(1) {
                 let mut properties = Properties::default();
                 // Times are those of time-outs, which are not walked.
-                if properties.set(property.name, Setting::Word(word)).is_ok() {
+                if properties
+                    .set(property.name, BusSetting::Word(word))
+                    .is_ok()
+                {
                     rings.push(RightRing::new(size, property.name, properties));
                 }
             }
@@ -262,7 +265,7 @@ impl Model {
     }
 
     /// The byte of a command that the drive waits for.
-    fn parameter(&self) -> Option<Parameter> {
+    fn parameter(&self) -> Option<ParameterByte> {
         match self.place() {
             Place::Parameter(parameter) => Some(parameter),
             _ => None,
@@ -310,7 +313,7 @@ impl Model {
 
     /// The command that writes, of which the drive waits for the checking byte.
     fn writes(&self) -> Option<Kind> {
-        let Parameter { kind, field, .. } = self.parameter()?;
+        let ParameterByte { kind, field, .. } = self.parameter()?;
         (field == Field::Check && !kind.reads() && kind != Kind::ResetH8).then_some(kind)
     }
 
@@ -479,7 +482,7 @@ fn admit(guard: &mut Guard, now: Instant, byte: u8) -> Result<(), String> {
 }
 
 /// The byte that a drive accepts here: addresses of the cells that are tried, data that differ from what they hold, and the right checking byte.
-fn accepted(parameter: &Parameter, holds: impl Fn(u16) -> u8) -> u8 {
+fn accepted(parameter: &ParameterByte, holds: impl Fn(u16) -> u8) -> u8 {
     match parameter.field {
         Field::AddrL => WORD as u8,
         Field::AddrH => (WORD >> 8) as u8,

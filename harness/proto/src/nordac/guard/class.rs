@@ -6,7 +6,7 @@ use crate::nordac::pkw::{Pkw, Task};
 
 /// What a write to a parameter may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Class {
+pub enum TaskClass {
     /// Changes the EEPROM and nothing that moves.
     Stored,
     /// Changes data of the motor or of its protection.
@@ -21,9 +21,9 @@ pub enum Class {
     Never,
 }
 
-/// First number, last number, class; every other parameter is [`Class::Stored`].
-const CLASSES: &[(u16, u16, Class)] = {
-    use Class::{BusSettings, Everything, MotorData, Never, Speed};
+/// First number, last number, class; every other parameter is [`TaskClass::Stored`].
+const CLASSES: &[(u16, u16, TaskClass)] = {
+    use TaskClass::{BusSettings, Everything, MotorData, Never, Speed};
     &[
         (967, 967, Never),
         (970, 970, Everything),
@@ -52,38 +52,38 @@ const CLASSES: &[(u16, u16, Class)] = {
 
 /// What a write to this number may do. A number that cannot be written, or is not listed, may do everything.
 #[must_use]
-pub fn class(number: u16) -> Class {
+pub fn class(number: u16) -> TaskClass {
     let listed = CLASSES
         .iter()
         .find(|(first, last, _)| (*first..=*last).contains(&number))
         .map(|(_, _, class)| *class);
     match Parameter::of(number) {
-        _ if listed == Some(Class::Never) => Class::Never,
-        Some(parameter) if !parameter.has(Flag::ReadOnly) => listed.unwrap_or(Class::Stored),
-        _ => Class::Everything,
+        _ if listed == Some(TaskClass::Never) => TaskClass::Never,
+        Some(parameter) if !parameter.has(Flag::ReadOnly) => listed.unwrap_or(TaskClass::Stored),
+        _ => TaskClass::Everything,
     }
 }
 
 /// The permissions that a task needs.
-pub(super) const fn need(class: Class) -> &'static [Missing] {
+pub(super) const fn need(class: TaskClass) -> &'static [Missing] {
     match class {
-        Class::Stored => &[Missing::Eeprom],
-        Class::MotorData => &[Missing::Eeprom, Missing::MotorData],
-        Class::Speed => &[Missing::Eeprom, Missing::MotorData, Missing::Motion],
-        Class::BusSettings => &[Missing::Eeprom, Missing::BusSettings],
-        Class::Everything | Class::Never => &[Missing::Everything],
+        TaskClass::Stored => &[Missing::Eeprom],
+        TaskClass::MotorData => &[Missing::Eeprom, Missing::MotorData],
+        TaskClass::Speed => &[Missing::Eeprom, Missing::MotorData, Missing::Motion],
+        TaskClass::BusSettings => &[Missing::Eeprom, Missing::BusSettings],
+        TaskClass::Everything | TaskClass::Never => &[Missing::Everything],
     }
 }
 
 /// What a task may do; `None` where it only reads. A task that the manual calls invalid may do everything.
-pub(super) fn of_task(pkw: Pkw) -> Option<Class> {
+pub(super) fn of_task(pkw: Pkw) -> Option<TaskClass> {
     match pkw.task() {
         Task::None
         | Task::Request
         | Task::RequestDescription
         | Task::RequestArray
         | Task::Elements => None,
-        Task::Invalid(_) => Some(Class::Everything),
+        Task::Invalid(_) => Some(TaskClass::Everything),
         _ => Some(class(pkw.number())),
     }
 }

@@ -112,7 +112,7 @@ impl fmt::Display for Act {
 
 /// Why the FCS of a telegram is kept back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Denial {
+pub enum FcsDenial {
     /// The rig's file does not permit it.
     NotPermitted {
         /// The station.
@@ -203,7 +203,7 @@ impl fmt::Display for Fast {
     }
 }
 
-impl fmt::Display for Denial {
+impl fmt::Display for FcsDenial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotPermitted {
@@ -252,4 +252,4 @@ impl fmt::Display for Denial {
     }
 }
 
-impl core::error::Error for Denial {}
+impl core::error::Error for FcsDenial {}

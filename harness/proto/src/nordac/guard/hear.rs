@@ -1,7 +1,7 @@
 //! The replies on the line, read along with what is sent.
 
 use crate::decode::Decoded;
-use crate::profibus::fdl::Status;
+use crate::profibus::fdl::FcStatus;
 use crate::profibus::{Buffer, Pdu, Telegram};
 
 /// The reply to the last request, as far as it has come.
@@ -38,7 +38,7 @@ impl Ear {
         let answers = (reply.sa(), reply.da()) == (asked.da(), asked.sa());
         let known = matches!(
             reply.fc().status(),
-            Some(Status::DataLow | Status::DataHigh | Status::Rs)
+            Some(FcStatus::DataLow | FcStatus::DataHigh | FcStatus::Rs)
         );
         (answers && known).then_some((asked, reply))
     }

@@ -8,7 +8,7 @@ use crate::nordac::ppo::{Image, PpoType};
 use crate::nordac::words::{FULL, set_of, stw};
 use crate::profibus::Pdu;
 use crate::profibus::dp::{GlobalControl, Service, SetPrm};
-use crate::profibus::fdl::Status;
+use crate::profibus::fdl::FcStatus;
 use alloc::vec::Vec;
 
 /// What the gate knows of a slave.
@@ -212,7 +212,7 @@ impl KnownSlave {
     /// Takes notice of a reply to a request.
     pub(super) fn replied(&mut self, asked: &Pdu, reply: &Pdu) {
         let service = Service::of(asked.dsap());
-        if reply.fc().status() == Some(Status::Rs) {
+        if reply.fc().status() == Some(FcStatus::Rs) {
             self.left |= service == Some(Service::DataExchange);
             return;
         }

@@ -1,7 +1,7 @@
 //! What octets may do to a physical inverter, decided octet by octet: the FCS of a denied telegram is kept back, and no station takes the
 //! telegram without it.
 //!
-//! Any octet may be the start of a telegram for some station: a gap in the middle of what the bench sends is enough. So the [`Gate`] follows
+//! Any octet may be the start of a telegram for some station: a gap in the middle of what the bench sends is enough. So the [`OctetGate`] follows
 //! every possible start, and keeps back the FCS of a denied telegram whatever stands before it. Where the manual leaves open how an inverter reads a
 //! telegram, the more dangerous reading counts. Zeros do not stop a motor, so they are no way to a safe state: [`stw::SAFE`] is.
 
@@ -11,8 +11,8 @@ mod hear;
 mod known;
 mod limits;
 
-pub use class::{Class, class};
-pub use denial::{Act, Denial, Fast, Missing, Supervision};
+pub use class::{TaskClass, class};
+pub use denial::{Act, Fast, FcsDenial, Missing, Supervision};
 pub use limits::{Highest, Limits};
 
 use super::pkw::Pkw;
@@ -20,7 +20,7 @@ use super::ppo::{Image, PpoType};
 use super::words::stw;
 use crate::decode::Decoded;
 use crate::profibus::dp::{GlobalControl, Service, SetPrm};
-use crate::profibus::fdl::{BROADCAST, ED, Function, SD1, SD2, SD3};
+use crate::profibus::fdl::{BROADCAST, ED, FcFunction, SD1, SD2, SD3};
 use crate::profibus::rate::SYN_BITS;
 use crate::profibus::{Buffer, BusRate, Pdu, Telegram};
 use crate::time::Instant;
@@ -47,7 +47,7 @@ struct Candidate {
 
 /// Judges every octet before it is sent.
 #[derive(Clone, Debug)]
-pub struct Gate {
+pub struct OctetGate {
     limits: Limits,
     rate: BusRate,
     slaves: Vec<KnownSlave>,
@@ -60,7 +60,7 @@ pub struct Gate {
     ear: Ear,
 }
 
-impl Gate {
+impl OctetGate {
     /// A gate in front of a segment of this rate with these slaves.
     #[must_use]
     pub fn new(limits: Limits, rate: BusRate, slaves: &[GuardedSlave]) -> Self {
@@ -79,8 +79,8 @@ impl Gate {
     /// Judges an octet that is about to be sent at `now`; an octet that is admitted counts as sent.
     ///
     /// # Errors
-    /// [`Denial`]: with this octet a telegram would be complete but for its end. It must not be sent, and the gate has not changed.
-    pub fn admit(&mut self, now: Instant, octet: u8) -> Result<(), Denial> {
+    /// [`FcsDenial`]: with this octet a telegram would be complete but for its end. It must not be sent, and the gate has not changed.
+    pub fn admit(&mut self, now: Instant, octet: u8) -> Result<(), FcsDenial> {
         let idle = now >= self.free + self.rate.bit_time() * SYN_BITS;
         let completed: Vec<_> = self
             .candidates
@@ -183,7 +183,7 @@ impl Gate {
         self.candidates.is_empty()
     }
 
-    fn judge(&self, pdu: &Pdu) -> Result<(), Denial> {
+    fn judge(&self, pdu: &Pdu) -> Result<(), FcsDenial> {
         let station = pdu.da();
         if !pdu.fc().is_request() || only_reads(pdu) {
             return Ok(());
@@ -191,7 +191,7 @@ impl Gate {
         let service = Service::of(pdu.dsap());
         let denied = |act, missing: Missing| match missing.held(&self.limits) {
             true => Ok(()),
-            false => Err(Denial::NotPermitted {
+            false => Err(FcsDenial::NotPermitted {
                 station,
                 act,
                 missing,
@@ -208,7 +208,7 @@ impl Gate {
         } else if !is_listed
             && (service == Some(Service::SetSlaveAdd) || !self.limits.other_stations)
         {
-            return Err(Denial::OtherStation { station });
+            return Err(FcsDenial::OtherStation { station });
         }
         match service {
             Some(Service::DataExchange) => self.judge_exchange(pdu)?,
@@ -233,7 +233,7 @@ impl Gate {
         }
         let mut meant = self.meant(station);
         if !self.limits.unsupervised && meant.any(|slave| slave.enabled && slave.ended_by(pdu)) {
-            return Err(Denial::StillEnabled { station });
+            return Err(FcsDenial::StillEnabled { station });
         }
         Ok(())
     }
@@ -245,7 +245,7 @@ impl Gate {
     }
 
     /// A Data_Exchange, read in every way in which a slave may read it.
-    fn judge_exchange(&self, pdu: &Pdu) -> Result<(), Denial> {
+    fn judge_exchange(&self, pdu: &Pdu) -> Result<(), FcsDenial> {
         let station = pdu.da();
         let mut listed = false;
         for slave in self.meant(station) {
@@ -268,13 +268,13 @@ impl Gate {
         slave: Option<&KnownSlave>,
         ppo: PpoType,
         data: &[u8],
-    ) -> Result<(), Denial> {
+    ) -> Result<(), FcsDenial> {
         let Some(image) = Image::decode(ppo, data) else {
             return Ok(());
         };
         if let Some(act) = moves(&image) {
             if !self.limits.motion {
-                return Err(Denial::NotPermitted {
+                return Err(FcsDenial::NotPermitted {
                     station,
                     act,
                     missing: Missing::Motion,
@@ -288,20 +288,25 @@ impl Gate {
             if enables(image.first()) && !self.limits.unsupervised {
                 slave
                     .supervised()
-                    .map_err(|watch| Denial::Unsupervised { station, watch })?;
+                    .map_err(|watch| FcsDenial::Unsupervised { station, watch })?;
             }
             if let Some(fast) = self
                 .limits
                 .highest
                 .and_then(|most| slave.too_fast(most, &image))
             {
-                return Err(Denial::Speed { station, fast });
+                return Err(FcsDenial::Speed { station, fast });
             }
         }
         self.judge_task(station, slave, image.pkw)
     }
 
-    fn judge_task(&self, station: u8, slave: Option<&KnownSlave>, pkw: Pkw) -> Result<(), Denial> {
+    fn judge_task(
+        &self,
+        station: u8,
+        slave: Option<&KnownSlave>,
+        pkw: Pkw,
+    ) -> Result<(), FcsDenial> {
         let Some(class) = class::of_task(pkw) else {
             return Ok(());
         };
@@ -309,12 +314,12 @@ impl Gate {
             ak: pkw.ak(),
             number: pkw.number(),
         };
-        if class == Class::Never {
-            return Err(Denial::Never { station, act });
+        if class == TaskClass::Never {
+            return Err(FcsDenial::Never { station, act });
         }
         let mut need = class::need(class).iter().copied();
         if let Some(missing) = need.find(|missing| !missing.held(&self.limits)) {
-            return Err(Denial::NotPermitted {
+            return Err(FcsDenial::NotPermitted {
                 station,
                 act,
                 missing,
@@ -324,11 +329,11 @@ impl Gate {
             && pkw.low_word() > most
         {
             let fast = Fast::Maximum;
-            return Err(Denial::Speed { station, fast });
+            return Err(FcsDenial::Speed { station, fast });
         }
         let again = slave.is_some_and(|slave| slave.task == pkw);
         match self.limits.most_writes {
-            Some(most) if self.writes >= most && !again => Err(Denial::Wear { most }),
+            Some(most) if self.writes >= most && !again => Err(FcsDenial::Wear { most }),
             _ => Ok(()),
         }
     }
@@ -372,7 +377,7 @@ fn only_reads(pdu: &Pdu) -> bool {
     );
     let asks = matches!(
         pdu.fc().function(),
-        Some(Function::FdlStatus | Function::Ident | Function::LsapStatus)
+        Some(FcFunction::FdlStatus | FcFunction::Ident | FcFunction::LsapStatus)
     );
     reads || asks
 }

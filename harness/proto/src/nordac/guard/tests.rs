@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::nordac::words::stw::{READY, SAFE, START};
-use crate::profibus::fdl::{FrameControl, Sequence, Status};
+use crate::profibus::fdl::{FcStatus, FrameControl, Sequence};
 use crate::time::Span;
 use proptest::prelude::*;
 use std::string::{String, ToString};
@@ -19,12 +19,12 @@ const SLAVES: [GuardedSlave; 2] = [
     },
 ];
 
-fn gate(limits: Limits) -> Gate {
-    Gate::new(limits, BusRate::K500, &SLAVES)
+fn gate(limits: Limits) -> OctetGate {
+    OctetGate::new(limits, BusRate::K500, &SLAVES)
 }
 
 fn request(da: u8, service: Service, data: &[u8]) -> Pdu {
-    let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+    let control = FrameControl::request(FcFunction::SrdHigh, Sequence::First);
     Pdu::with_saps(da, 2, control, service.sap(), service.master_sap(), data).unwrap()
 }
 
@@ -46,7 +46,7 @@ fn task(number: u16, pwe: u32) -> Pdu {
 }
 
 /// Sends a telegram octet by octet: the place of the octet that is denied, and why.
-fn send(gate: &mut Gate, pdu: Pdu) -> Option<(usize, Denial)> {
+fn send(gate: &mut OctetGate, pdu: Pdu) -> Option<(usize, FcsDenial)> {
     let all = Telegram::Pdu(pdu).encode();
     let now = gate.free + Span::from_millis(1);
     for (place, octet) in all.iter().enumerate() {
@@ -58,14 +58,14 @@ fn send(gate: &mut Gate, pdu: Pdu) -> Option<(usize, Denial)> {
     None
 }
 
-fn denial(gate: &mut Gate, pdu: Pdu) -> Option<Denial> {
+fn denial(gate: &mut OctetGate, pdu: Pdu) -> Option<FcsDenial> {
     send(gate, pdu).map(|(_, denial)| denial)
 }
 
-fn missing(gate: &mut Gate, pdu: Pdu) -> Option<Missing> {
+fn missing(gate: &mut OctetGate, pdu: Pdu) -> Option<Missing> {
     match denial(gate, pdu) {
         None => None,
-        Some(Denial::NotPermitted { missing, .. }) => Some(missing),
+        Some(FcsDenial::NotPermitted { missing, .. }) => Some(missing),
         Some(other) => panic!("{other}"),
     }
 }
@@ -206,7 +206,7 @@ fn permissions() {
         Some(Missing::Motion)
     );
     assert_eq!(missing(&mut gate(motor), task(1304, 1)), None);
-    let never = Denial::Never {
+    let never = FcsDenial::Never {
         station: 8,
         act: Act::Task { ak: 2, number: 967 },
     };
@@ -219,7 +219,7 @@ fn permissions() {
 /// Other stations: reading only; an address to none of them.
 #[test]
 fn other_stations() {
-    let other = Some(Denial::OtherStation { station: 7 });
+    let other = Some(FcsDenial::OtherStation { station: 7 });
     assert_eq!(denial(&mut gate(Limits::default()), words(7, 0, 0)), other);
     assert_eq!(
         denial(
@@ -251,7 +251,7 @@ fn supervision() {
         ..Limits::default()
     };
     let mut gate = gate(limits);
-    let unsupervised = |watch| Some(Denial::Unsupervised { station: 8, watch });
+    let unsupervised = |watch| Some(FcsDenial::Unsupervised { station: 8, watch });
     assert_eq!(
         denial(&mut gate, words(8, START, 0)),
         unsupervised(Supervision::Timeout)
@@ -270,7 +270,7 @@ fn supervision() {
     assert_eq!(denial(&mut gate, prm), None);
     assert_eq!(denial(&mut gate, words(8, START, 0)), None);
     assert_eq!(gate.enabled().collect::<Vec<_>>(), [8]);
-    let still = Some(Denial::StillEnabled { station: 8 });
+    let still = Some(FcsDenial::StillEnabled { station: 8 });
     let short = request(8, Service::DataExchange, &[0; 4]);
     let ends = [prm, request(8, Service::ChkCfg, &[0xF1]), short];
     for pdu in ends {
@@ -311,12 +311,12 @@ fn a_slave_that_has_left_is_started_again() {
     };
     let prm = request(8, Service::SetPrm, &prm.encode().unwrap());
     let cfg = request(8, Service::ChkCfg, PpoType::One.cfg());
-    let still = Some(Denial::StillEnabled { station: 8 });
+    let still = Some(FcsDenial::StillEnabled { station: 8 });
     assert_eq!(denial(&mut gate, prm), None);
     assert_eq!(denial(&mut gate, words(8, START, 0)), None);
     assert_eq!(denial(&mut gate, prm), still);
     assert_eq!(denial(&mut gate, words(8, START, 0)), None);
-    let rs = Pdu::new(2, 8, FrameControl::reply(Status::Rs), &[]).unwrap();
+    let rs = Pdu::new(2, 8, FrameControl::reply(FcStatus::Rs), &[]).unwrap();
     for octet in Telegram::Pdu(rs).encode().iter() {
         gate.hear(Some(*octet));
     }
@@ -327,12 +327,12 @@ fn a_slave_that_has_left_is_started_again() {
 }
 
 /// The reply of slave 8 to an exchange, with this in its parameter channel.
-fn reply(gate: &mut Gate, shown: Pkw) {
+fn reply(gate: &mut OctetGate, shown: Pkw) {
     let image = Image {
         pkw: shown,
         ..Image::default()
     };
-    let control = FrameControl::reply(Status::DataLow);
+    let control = FrameControl::reply(FcStatus::DataLow);
     let pdu = Pdu::new(2, 8, control, &image.encode(PpoType::One)).unwrap();
     for octet in Telegram::Pdu(pdu).encode().iter() {
         gate.hear(Some(*octet));
@@ -356,7 +356,7 @@ fn what_slaves_reply_is_learnt() {
     };
     let prm = request(8, Service::SetPrm, &prm.encode().unwrap());
     assert_eq!(denial(&mut gate, prm), None);
-    let unsupervised = Some(Denial::Unsupervised {
+    let unsupervised = Some(FcsDenial::Unsupervised {
         station: 8,
         watch: Supervision::Timeout,
     });
@@ -405,7 +405,7 @@ fn another_configuration_makes_the_layout_unknown() {
     // Get_Cfg shows which one it has.
     let ask = request(8, Service::GetCfg, &[]);
     assert_eq!(denial(&mut gate, ask), None);
-    let control = FrameControl::reply(Status::DataLow);
+    let control = FrameControl::reply(FcStatus::DataLow);
     let cfg = PpoType::One.cfg();
     let pdu = Pdu::with_saps(2, 8, control, ask.ssap(), ask.dsap(), cfg).unwrap();
     for octet in Telegram::Pdu(pdu).encode().iter() {
@@ -443,7 +443,7 @@ fn speeds() {
         unsupervised: true,
         ..Limits::default()
     };
-    let fast = |fast| Some(Denial::Speed { station: 8, fast });
+    let fast = |fast| Some(FcsDenial::Speed { station: 8, fast });
     let mut gate = gate(Limits {
         highest: Some(Highest::Setpoint(0x2000)),
         ..motion
@@ -480,7 +480,7 @@ fn speeds() {
     gate.learn(9, 1205, 0, 700);
     assert_eq!(
         denial(&mut gate, second),
-        Some(Denial::Speed {
+        Some(FcsDenial::Speed {
             station: 9,
             fast: Fast::Second
         })
@@ -501,10 +501,10 @@ fn wear() {
     assert_eq!(gate.writes(), 2);
     assert_eq!(
         denial(&mut gate, task(1600, 3)),
-        Some(Denial::Wear { most: 2 })
+        Some(FcsDenial::Wear { most: 2 })
     );
     assert_eq!(denial(&mut gate, task(1600, 2)), None);
-    let first: String = Denial::Wear { most: 2 }.to_string();
+    let first: String = FcsDenial::Wear { most: 2 }.to_string();
     assert!(first.contains("max_eeprom_writes"));
 }
 
@@ -619,7 +619,7 @@ proptest! {
         let mut gate = gate(Limits::unlimited());
         for octet in octets {
             match gate.admit(Instant::START, octet) {
-                Ok(()) | Err(Denial::Never { .. } | Denial::OtherStation { .. }) => {}
+                Ok(()) | Err(FcsDenial::Never { .. } | FcsDenial::OtherStation { .. }) => {}
                 Err(other) => prop_assert!(false, "{}", other),
             }
         }

@@ -11,7 +11,7 @@ use core::fmt;
 
 /// A byte that did not pass, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Denial {
+pub struct DeniedByte {
     /// The number of the byte since the guard began, counted from 1.
     pub number: u64,
     /// The byte.
@@ -104,7 +104,7 @@ impl Cause {
     }
 }
 
-impl Denial {
+impl DeniedByte {
     /// The drive that is meant; `None` where there is none of this address.
     #[must_use]
     pub fn drive(&self) -> Option<u8> {
@@ -113,7 +113,7 @@ impl Denial {
     }
 }
 
-impl fmt::Display for Denial {
+impl fmt::Display for DeniedByte {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "byte {} ({:02X}) is not sent: ", self.number, self.byte)?;
         let whom = |f: &mut fmt::Formatter<'_>| match (self.drive(), self.address) {
@@ -217,7 +217,7 @@ impl fmt::Display for Denial {
     }
 }
 
-impl core::error::Error for Denial {}
+impl core::error::Error for DeniedByte {}
 
 impl fmt::Display for DriveAct {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

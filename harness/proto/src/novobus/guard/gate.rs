@@ -2,7 +2,7 @@
 
 use super::FIRST_ADDRESS;
 use super::asked::SentCommands;
-use super::denial::{Cause, Denial};
+use super::denial::{Cause, DeniedByte};
 use super::doubt::Doubt;
 use super::effect::DriveAct;
 use super::half::{Half, length};
@@ -314,15 +314,15 @@ impl Guard {
     /// as requested, so the byte must also be allowed as a good byte, and the guard's state becomes doubtful.
     ///
     /// # Errors
-    /// [`Denial`]: it must not be sent. No byte passes after that until [`Self::reset_after_denial`]; nothing else changes.
-    pub fn admit(&mut self, now: Instant, byte: u8, line_error: bool) -> Result<(), Denial> {
+    /// [`DeniedByte`]: it must not be sent. No byte passes after that until [`Self::reset_after_denial`]; nothing else changes.
+    pub fn admit(&mut self, now: Instant, byte: u8, line_error: bool) -> Result<(), DeniedByte> {
         match self.judge(now, byte) {
             Ok(next) => {
                 self.commit(now, byte, line_error, next);
                 Ok(())
             }
             Err(cause) => {
-                let denial = Denial {
+                let denial = DeniedByte {
                     number: self.passed + 1,
                     byte,
                     ring: self.ring,

@@ -72,7 +72,7 @@ mod touched;
 /// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
 const FIRST_ADDRESS: u8 = 6;
 
-pub use denial::{Cause, Denial};
+pub use denial::{Cause, DeniedByte};
 pub use effect::DriveAct;
 pub use gate::Guard;
 pub use known::{Configuration, Facts, Found};

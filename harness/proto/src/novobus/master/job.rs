@@ -139,7 +139,7 @@ impl core::error::Error for Refused {}
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The data that were read.
-    Read(Data),
+    Read(ReadData),
     /// It ran: the drive's own checking byte has come back.
     Done {
         /// Whether it may have run before, with its answer lost.
@@ -154,13 +154,13 @@ pub enum Outcome {
 
 /// What a read brought, in memory order: byte 0 stands at the lowest address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Data {
+pub struct ReadData {
     pub(super) bytes: [u8; 4],
     pub(super) known: u8,
     pub(super) width: u8,
 }
 
-impl Data {
+impl ReadData {
     /// Byte `i`, if the answer holds it (one form of `ReadLong` leaves byte 2 out).
     #[must_use]
     pub fn byte(&self, i: usize) -> Option<u8> {

@@ -76,7 +76,7 @@ mod tests;
 pub use cycle::CyclePace;
 pub use event::{Counters, Event};
 pub use fault::{BusStop, Fault, LinkEnd, RingLink};
-pub use job::{Data, Job, JobId, Outcome, Refused, Repeat};
+pub use job::{Job, JobId, Outcome, ReadData, Refused, Repeat};
 pub use options::{MasterOptions, Packing};
 
 use super::address::RingSize;

@@ -6,7 +6,7 @@ use super::super::checksum::Checksum;
 use super::super::command::{Kind, Layout, Reply};
 use super::super::properties::ReadLongAnswer;
 use super::in_flight::JobSlot;
-use super::job::{Data, Job, JobId};
+use super::job::{Job, JobId, ReadData};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -27,7 +27,7 @@ pub(super) struct Entry {
     /// How many bytes of the answer have come back right.
     returned: u8,
     answer_sum: Checksum,
-    pub(super) data: Data,
+    pub(super) data: ReadData,
     /// All of the command was sent before, and its answer was lost.
     pub(super) perhaps_run: bool,
     before: Option<JobSlot>,
@@ -52,7 +52,7 @@ impl Entry {
             sent: 0,
             returned: 0,
             answer_sum: Checksum::EMPTY,
-            data: Data::default(),
+            data: ReadData::default(),
             perhaps_run: false,
             before: None,
             behind: None,
@@ -129,8 +129,8 @@ impl Entry {
         self.layout.answer.last() == Some(&Reply::Check)
     }
 
-    pub(super) fn read(&self) -> Data {
-        Data {
+    pub(super) fn read(&self) -> ReadData {
+        ReadData {
             width: self.kind.width(),
             ..self.data
         }
@@ -142,7 +142,7 @@ impl Entry {
         self.sent = 0;
         self.returned = 0;
         self.answer_sum = Checksum::EMPTY;
-        self.data = Data::default();
+        self.data = ReadData::default();
     }
 }
 

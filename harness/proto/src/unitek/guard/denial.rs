@@ -80,7 +80,7 @@ pub enum Denial {
         /// The register.
         register: u8,
         /// Why.
-        fast: Fast,
+        fast: FastWrite,
     },
     /// The replies of all cycles would take more than half of the bit rate.
     Load {
@@ -102,7 +102,7 @@ pub enum Denial {
 
 /// Why a write could turn a motor faster than [`Limits::max_speed`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Fast {
+pub enum FastWrite {
     /// The value is above the highest speed.
     Above {
         /// The highest speed as 31 counts it.
@@ -119,7 +119,7 @@ pub enum Fast {
     Scale,
 }
 
-impl fmt::Display for Fast {
+impl fmt::Display for FastWrite {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Above { most } => write!(f, "the value is above `max_speed`: at most {most} of 32767 is permitted"),

@@ -3,7 +3,7 @@
 //! Reading needs no permission, but cycles load the bus: 181 beats 201 in arbitration, so replies could lock the master out, even its
 //! stop frame. Where the manual leaves open how a drive reads a frame (`dlc4`), the more dangerous reading counts.
 //!
-//! The [`Gate`] sees every frame before it is sent, and knows the lock, the identifiers and the cycles from these frames alone.
+//! The [`FrameGate`] sees every frame before it is sent, and knows the lock, the identifiers and the cycles from these frames alone.
 
 mod class;
 mod denial;
@@ -12,7 +12,7 @@ mod range;
 mod speed;
 
 pub use class::{Class, NAMED, class};
-pub use denial::{Denial, Fast, Missing};
+pub use denial::{Denial, FastWrite, Missing};
 pub use range::ValueRange;
 
 use super::frame::{Data, Ignored, Request, low};
@@ -106,7 +106,7 @@ const EEPROM_REST: Span = Span::from_millis(60_000);
 
 /// Judges every frame of a bus before it is sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Gate {
+pub struct FrameGate {
     limits: Limits,
     rate: BitRate,
     drives: Vec<GuardedDrive>,
@@ -116,7 +116,7 @@ pub struct Gate {
     eeprom_writes: u32,
 }
 
-impl Gate {
+impl FrameGate {
     /// A gate in front of a bus of this rate with drives that receive and send on these identifiers.
     #[must_use]
     pub fn new(limits: Limits, rate: BitRate, drives: &[(u16, u16)]) -> Self {

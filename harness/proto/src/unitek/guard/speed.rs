@@ -1,7 +1,7 @@
 //! The highest speed that a drive may be told.
 
 use super::HighestSpeed;
-use super::denial::Fast;
+use super::denial::FastWrite;
 use crate::unitek::words::MODE_LOCK;
 
 /// What is known of the speed at which a drive would turn.
@@ -30,11 +30,11 @@ impl Speed {
     }
 
     /// Why a permitted write does not pass while there is a highest speed.
-    pub(super) fn denies(self, max: HighestSpeed, register: u8, value: u16) -> Option<Fast> {
+    pub(super) fn denies(self, max: HighestSpeed, register: u8, value: u16) -> Option<FastWrite> {
         let size = value.cast_signed().unsigned_abs();
         let bounds_itself = match register {
             // They change what 100 % is, or bring back a whole set of registers with it.
-            0x83 | 0xC8 => return Some(Fast::Scale),
+            0x83 | 0xC8 => return Some(FastWrite::Scale),
             0x51 if value & MODE_LOCK != 0 => return None,
             0x21 | 0x31 | 0x90 if value == 0 => return None,
             0x31 | 0x34 | 0x76 | 0x77 => Some(size),
@@ -43,14 +43,14 @@ impl Speed {
             _ => return None,
         };
         let Some(most) = self.most(max) else {
-            return Some(Fast::FullUnknown);
+            return Some(FastWrite::FullUnknown);
         };
         let within = |speed: Option<u16>| speed.is_some_and(|speed| speed <= most);
         let limited = !matches!(register, 0x34 | 0x76 | 0x77) && within(self.limit);
         match (within(bounds_itself) || limited, bounds_itself) {
             (true, _) => None,
-            (false, Some(_)) => Some(Fast::Above { most }),
-            (false, None) => Some(Fast::LimitUnknown { most }),
+            (false, Some(_)) => Some(FastWrite::Above { most }),
+            (false, None) => Some(FastWrite::LimitUnknown { most }),
         }
     }
 

@@ -65,11 +65,11 @@ pub enum Job {
 
 /// The number of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JobId(pub u64);
+pub struct JobNumber(pub u64);
 
 /// Why a job is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
+pub enum JobRefusal {
     /// Too many jobs wait.
     Full,
     /// The drive has places for 8 cycles.
@@ -78,7 +78,7 @@ pub enum Refused {
     Interval,
 }
 
-impl fmt::Display for Refused {
+impl fmt::Display for JobRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Full => "too many jobs wait: wait for results first",
@@ -90,7 +90,7 @@ impl fmt::Display for Refused {
     }
 }
 
-impl core::error::Error for Refused {}
+impl core::error::Error for JobRefusal {}
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,11 +123,11 @@ pub enum Outcome {
 
 /// Something to report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum MasterEvent {
     /// A job has ended; each one does so once.
     Ended {
         /// The job.
-        id: JobId,
+        id: JobNumber,
         /// How.
         outcome: Outcome,
     },

@@ -2,10 +2,10 @@
 //!
 //! It owns no port and no clock (sans-IO). The caller calls
 //!
-//! * [`Master::poll_transmit`] whenever the bus takes a frame, and sends the frame that it gives;
-//! * [`Master::handle_frame`] with every frame of the bus;
-//! * [`Master::handle_timeout`] when [`Master::poll_timeout`] is past;
-//! * [`Master::poll_event`] after any of these.
+//! * [`CanMaster::poll_transmit`] whenever the bus takes a frame, and sends the frame that it gives;
+//! * [`CanMaster::handle_frame`] with every frame of the bus;
+//! * [`CanMaster::handle_timeout`] when [`CanMaster::poll_timeout`] is past;
+//! * [`CanMaster::poll_event`] after any of these.
 //!
 //! # What a master can know
 //!
@@ -24,7 +24,7 @@
 mod job;
 mod slots;
 
-pub use job::{Disturbance, Event, Job, JobId, Options, Outcome, Refused};
+pub use job::{Disturbance, Job, JobNumber, JobRefusal, MasterEvent, Options, Outcome};
 pub use slots::Slot;
 
 use super::frame::{CYCLES, Data, NoReply, Reply, Request};
@@ -44,7 +44,7 @@ const POLL: Span = Span::from_millis(10);
 
 /// The master.
 #[derive(Clone, Debug)]
-pub struct Master {
+pub struct CanMaster {
     options: Options,
     /// The identifier to which it sends; after a write to 68 the old one as well.
     rx: (u16, Option<u16>),
@@ -52,13 +52,13 @@ pub struct Master {
     tx: (u16, Option<u16>),
     /// The lower half of MODE as it was last written, for a lock that keeps sending by event.
     mode: u16,
-    queue: VecDeque<(JobId, Job)>,
+    queue: VecDeque<(JobNumber, Job)>,
     next_id: u64,
     current: Option<Current>,
     slots: Slots,
     /// A register whose request may still be answered, and until when.
     owed: Option<(u8, Instant)>,
-    events: VecDeque<Event>,
+    events: VecDeque<MasterEvent>,
     other_events: usize,
     lost_events: u64,
 }
@@ -66,7 +66,7 @@ pub struct Master {
 /// The job under way.
 #[derive(Clone, Debug)]
 struct Current {
-    id: JobId,
+    id: JobNumber,
     job: Job,
     phase: JobPhase,
     /// The step of a start-up.
@@ -114,7 +114,7 @@ const START_UP: [StartUpStep; 6] = [
     StartUpStep::Release,
 ];
 
-impl Master {
+impl CanMaster {
     /// A master of the drive that receives on `rx` and sends on `tx`.
     #[must_use]
     pub fn new(rx: u16, tx: u16, options: Options) -> Self {
@@ -137,21 +137,21 @@ impl Master {
     /// Takes a job; it runs after all that were submitted before it.
     ///
     /// # Errors
-    /// [`Refused`]; nothing is changed.
-    pub fn submit(&mut self, job: Job) -> Result<JobId, Refused> {
+    /// [`JobRefusal`]; nothing is changed.
+    pub fn submit(&mut self, job: Job) -> Result<JobNumber, JobRefusal> {
         if self.queue.len() >= MOST_JOBS {
-            return Err(Refused::Full);
+            return Err(JobRefusal::Full);
         }
         if let Job::Cycle { register, every } = job {
             if !(1..=254).contains(&every) {
-                return Err(Refused::Interval);
+                return Err(JobRefusal::Interval);
             }
             let planned = self.planned_cycles(register);
             if planned >= CYCLES {
-                return Err(Refused::EightCycles);
+                return Err(JobRefusal::EightCycles);
             }
         }
-        let id = JobId(self.next_id);
+        let id = JobNumber(self.next_id);
         self.next_id += 1;
         self.queue.push_back((id, job));
         Ok(id)
@@ -192,7 +192,7 @@ impl Master {
         Some(frame)
     }
 
-    fn begin(&mut self, id: JobId, job: Job, now: Instant) {
+    fn begin(&mut self, id: JobNumber, job: Job, now: Instant) {
         let first = match job {
             Job::Read { register } => Request::Read { register },
             Job::Write { register, data } => Request::Write { register, data },
@@ -331,7 +331,7 @@ impl Master {
 
     fn end(&mut self, outcome: Outcome) {
         if let Some(current) = self.current.take() {
-            self.events.push_back(Event::Ended {
+            self.events.push_back(MasterEvent::Ended {
                 id: current.id,
                 outcome,
             });
@@ -356,22 +356,27 @@ impl Master {
         let reply = match reply {
             Ok(reply) => reply,
             Err(NoReply::OtherIdentifier) => return,
-            Err(odd) => return self.report(Event::Disturbance(Disturbance::Odd(odd))),
+            Err(odd) => return self.report(MasterEvent::Disturbance(Disturbance::Odd(odd))),
         };
         let answers = self.answers(now, reply);
         let status = reply.register == 0x40 && self.mode & MODE_EVENT != 0;
         let tolerance = self.options.cycle_tolerance;
         match self.slots.heard(now, reply.register, tolerance) {
-            FrameTiming::Due => self.report(Event::Cyclic { reply }),
+            FrameTiming::Due => self.report(MasterEvent::Cyclic { reply }),
             _ if answers => {}
             FrameTiming::Stopped => {}
             _ if self.is_owed(now, reply.register) => {}
-            _ if status => self.report(Event::Status { reply }),
+            _ if status => self.report(MasterEvent::Status { reply }),
             FrameTiming::Early(after) => {
                 let register = reply.register;
-                self.report(Event::Disturbance(Disturbance::Early { register, after }));
+                self.report(MasterEvent::Disturbance(Disturbance::Early {
+                    register,
+                    after,
+                }));
             }
-            FrameTiming::Other => self.report(Event::Disturbance(Disturbance::Unasked { reply })),
+            FrameTiming::Other => {
+                self.report(MasterEvent::Disturbance(Disturbance::Unasked { reply }))
+            }
         }
     }
 
@@ -436,7 +441,7 @@ impl Master {
         }
     }
 
-    /// When [`Master::handle_timeout`], or [`Master::poll_transmit`] for a frame that had to wait, is due.
+    /// When [`CanMaster::handle_timeout`], or [`CanMaster::poll_transmit`] for a frame that had to wait, is due.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let job = match self.current.as_ref().map(|current| current.phase) {
@@ -451,7 +456,7 @@ impl Master {
     /// The time is `now`: requests without a reply are repeated or given up, and missing cyclic frames are reported.
     pub fn handle_timeout(&mut self, now: Instant) {
         while let Some(disturbance) = self.slots.missing(now, self.options.cycle_tolerance) {
-            self.report(Event::Disturbance(disturbance));
+            self.report(MasterEvent::Disturbance(disturbance));
         }
         let Some(current) = &mut self.current else {
             return;
@@ -475,15 +480,15 @@ impl Master {
     }
 
     /// The next event.
-    pub fn poll_event(&mut self) -> Option<Event> {
+    pub fn poll_event(&mut self) -> Option<MasterEvent> {
         let event = self.events.pop_front()?;
-        if !matches!(event, Event::Ended { .. }) {
+        if !matches!(event, MasterEvent::Ended { .. }) {
             self.other_events -= 1;
         }
         Some(event)
     }
 
-    fn report(&mut self, event: Event) {
+    fn report(&mut self, event: MasterEvent) {
         if self.other_events >= MOST_EVENTS {
             self.lost_events += 1;
             return;

@@ -1,20 +1,20 @@
 //! The guard: classes, the lock, load, new identifiers (what a write may do to a physical drive).
 
 use super::super::guard::{
-    Class, Denial, Fast, Gate, HighestSpeed, Limits, Missing, NAMED, ValueRange, class,
+    Class, Denial, FastWrite, FrameGate, HighestSpeed, Limits, Missing, NAMED, ValueRange, class,
 };
 use super::*;
 use alloc::vec;
 
-fn gate(limits: Limits) -> Gate {
-    Gate::new(
+fn gate(limits: Limits) -> FrameGate {
+    FrameGate::new(
         limits,
         BitRate::K500,
         &[(DEFAULT_RX, DEFAULT_TX), (0x202, 0x182)],
     )
 }
 
-fn denied(gate: &mut Gate, text: &str) -> Option<Denial> {
+fn denied(gate: &mut FrameGate, text: &str) -> Option<Denial> {
     gate.admit(Instant::START, &frame(text)).err()
 }
 
@@ -332,8 +332,8 @@ fn the_highest_speed() {
     };
     let fast = |register, fast| Some(Denial::Speed { register, fast });
     let most = 3277;
-    let above = |register| fast(register, Fast::Above { most });
-    let unknown = |register| fast(register, Fast::LimitUnknown { most });
+    let above = |register| fast(register, FastWrite::Above { most });
+    let unknown = |register| fast(register, FastWrite::LimitUnknown { most });
     let mut share = gate(limits(HighestSpeed::Raw(most)));
     // 10 % is 3277 (0CCD), -10 % is F333.
     assert_eq!(denied(&mut share, "201#31CE0C"), above(0x31));
@@ -366,7 +366,7 @@ fn the_highest_speed() {
     let mut rpm = gate(limits(HighestSpeed::Rpm(360)));
     assert_eq!(
         denied(&mut rpm, "201#310100"),
-        fast(0x31, Fast::FullUnknown)
+        fast(0x31, FastWrite::FullUnknown)
     );
     assert_eq!(denied(&mut rpm, "201#310000"), None);
     rpm.learn(0x201, 3600, 0x7FFF);
@@ -374,19 +374,19 @@ fn the_highest_speed() {
     assert_eq!(denied(&mut rpm, "201#31CD0C"), None);
     assert_eq!(
         denied(&mut rpm, "202#31CC0C"),
-        fast(0x31, Fast::FullUnknown)
+        fast(0x31, FastWrite::FullUnknown)
     );
     rpm.doubt();
     assert_eq!(
         denied(&mut rpm, "201#31CD0C"),
-        fast(0x31, Fast::FullUnknown)
+        fast(0x31, FastWrite::FullUnknown)
     );
     let mut scale = gate(Limits {
         max_speed: Some(HighestSpeed::Rpm(360)),
         ..Limits::unlimited()
     });
     for (text, register) in [("201#C8100E", 0xC8), ("201#830000", 0x83)] {
-        assert_eq!(denied(&mut scale, text), fast(register, Fast::Scale));
+        assert_eq!(denied(&mut scale, text), fast(register, FastWrite::Scale));
     }
 }
 

@@ -1,18 +1,18 @@
 //! Drives that answer another request than the one on the line.
 
-use super::{Deviation, How, Injection};
+use super::{Deviation, DpInjection, How};
 use crate::deviation::rows;
 use harness_proto::nordac::words::stw;
 use harness_proto::profibus::dp::{Diagnosis, DpState, GlobalControl, Service, SetPrm};
-use harness_proto::profibus::fdl::{BROADCAST, FrameControl, Function};
+use harness_proto::profibus::fdl::{BROADCAST, FcFunction, FrameControl};
 
 /// Whether the FC is an SRD.
 fn is_srd(fc: u8) -> bool {
-    FrameControl(fc).function().is_some_and(Function::is_srd)
+    FrameControl(fc).function().is_some_and(FcFunction::is_srd)
 }
 
 /// A row: name, section, what it does, how the request is changed, and how the reply if it is changed too.
-pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection:
+pub(super) static DEVIATIONS: &[Deviation] = rows! { DpInjection:
     "answers-broadcasts" "EN 1" "A request to station 127 is answered." Hears |s, p| {
         if p.da == BROADCAST && !p.is(Service::GlobalControl) { p.da = s.address(); }
     };
@@ -27,10 +27,10 @@ pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection:
         if p.fc & 0x10 != 0 && is_srd(p.fc) && p.is(Service::SlaveDiag) && let Some(master) = s.drive.slave().master() { p.sa = master; }
     }, |s, r| r.edit(|p| p.da = s.request.sa);
     "no-fdl-status" "EN 1" "An FDL status request is not answered." Hears |_, p| {
-        if FrameControl(p.fc).function() == Some(Function::FdlStatus) { p.times = 0; }
+        if FrameControl(p.fc).function() == Some(FcFunction::FdlStatus) { p.times = 0; }
     };
     "low-priority-only" "EN 1" "SRD high is not answered." Hears |_, p| {
-        if FrameControl(p.fc).function() == Some(Function::SrdHigh) { p.times = 0; }
+        if FrameControl(p.fc).function() == Some(FcFunction::SrdHigh) { p.times = 0; }
     };
     "any-ident" "EN 2" "Set_Prm is accepted with any ident number." Hears |_, p| p.prm(|data| {
         data[4] = 0x75;

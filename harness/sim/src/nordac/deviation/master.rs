@@ -12,11 +12,11 @@ use harness_proto::profibus::rate::SYN_BITS;
 use harness_proto::time::Span;
 
 /// A way in which a master breaks the bus standard or the manual.
-pub type MasterDeviation = Deviation<MasterInjection>;
+pub type MasterDeviation = Deviation<DpMasterInjection>;
 
 /// How a master is made to deviate.
 #[derive(Clone, Copy)]
-pub struct MasterInjection(How);
+pub struct DpMasterInjection(How);
 
 /// Where it deviates.
 #[derive(Clone, Copy)]
@@ -83,8 +83,8 @@ fn outputs(parts: &mut Parts, change: impl FnOnce(&mut Image)) {
 }
 
 /// The deviations of a master.
-pub static MASTER_DEVIATIONS: DeviationTable<MasterInjection> = DeviationTable(&[
-    rows! { MasterInjection:
+pub static MASTER_DEVIATIONS: DeviationTable<DpMasterInjection> = DeviationTable(&[
+    rows! { DpMasterInjection:
         "master-odd-parity" "EN 1" "Octets have odd parity." Sends |line| for octet in &mut line.octets {
             octet.flips = Flips { parity: true, ..Flips::default() };
         };

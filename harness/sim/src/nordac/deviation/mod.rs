@@ -23,11 +23,11 @@ use reads::{Collector, Raw};
 use std::hash::{Hash as _, Hasher};
 
 /// A way in which a drive breaks the bus standard or the manual.
-pub type Deviation = deviation::Deviation<Injection>;
+pub type Deviation = deviation::Deviation<DpInjection>;
 
 /// How a drive is made to deviate.
 #[derive(Clone, Copy)]
-pub struct Injection(How);
+pub struct DpInjection(How);
 
 /// Where it deviates.
 #[derive(Clone, Copy)]
@@ -43,7 +43,7 @@ enum How {
 }
 
 /// The deviations of a drive: those of what it reads, of what it hears, and of what it sends.
-pub static DEVIATIONS: DeviationTable<Injection> =
+pub static DEVIATIONS: DeviationTable<DpInjection> =
     DeviationTable(&[reads::DEVIATIONS, hears::DEVIATIONS, sends::DEVIATIONS]);
 
 /// What a deviant drive remembers.

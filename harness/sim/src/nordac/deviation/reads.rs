@@ -1,6 +1,6 @@
 //! Drives that read a telegram where there is none (EN 1).
 
-use super::{Deviation, How, Injection};
+use super::{Deviation, DpInjection, How};
 use crate::deviation::rows;
 use crate::nordac::slave::expected;
 use harness_proto::line::{LineError, Received};
@@ -97,7 +97,7 @@ fn with(mut bytes: Vec<u8>, place: usize, octet: u8) -> Option<Vec<u8>> {
 }
 
 /// A row: name, section, what it does, and the octets that the drive reads in place of those on the line.
-pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Reads):
+pub(super) static DEVIATIONS: &[Deviation] = rows! { DpInjection(Reads):
     "ignores-parity" "EN 1" "An octet with a parity error counts." |raw| raw.with_errors(LineError::Parity);
     "ignores-framing" "EN 1" "An octet with a framing error counts." |raw| raw.with_errors(LineError::Framing);
     "ignores-gaps" "EN 1" "A telegram may have gaps up to T_SYN." |raw| {

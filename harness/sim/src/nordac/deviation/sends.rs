@@ -1,14 +1,14 @@
 //! Drives that send another reply than they should.
 
-use super::{Deviation, How, Injection};
+use super::{Deviation, DpInjection, How};
 use crate::deviation::rows;
 use harness_proto::nordac::Pkw;
 use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::dp::{Diagnosis, Service};
-use harness_proto::profibus::fdl::{FrameControl, Function};
+use harness_proto::profibus::fdl::{FcFunction, FrameControl};
 
 /// A row: name, section, what it does, and how the reply is changed.
-pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Sends):
+pub(super) static DEVIATIONS: &[Deviation] = rows! { DpInjection(Sends):
     "wrong-fcs" "EN 1" "FCS of a reply includes its FC twice." |_, r| r.raw(|octets| {
         if let [.., fcs, _] = &mut octets[..] { *fcs = fcs.wrapping_add(8); }
     });
@@ -23,13 +23,13 @@ pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Sends):
         r.edit(|p| (p.dsap, p.ssap) = (s.request.ssap, s.request.dsap));
     };
     "status-is-rs" "EN 1" "An FDL status request is answered with FC 03." |s, r| {
-        if FrameControl(s.request.fc).function() == Some(Function::FdlStatus) { r.edit(|p| p.fc = 3); }
+        if FrameControl(s.request.fc).function() == Some(FcFunction::FdlStatus) { r.edit(|p| p.fc = 3); }
     };
     "status-of-a-master" "EN 1" "An FDL status request is answered as by a master in the ring." |s, r| {
-        if FrameControl(s.request.fc).function() == Some(Function::FdlStatus) { r.edit(|p| p.fc = 0x30); }
+        if FrameControl(s.request.fc).function() == Some(FcFunction::FdlStatus) { r.edit(|p| p.fc = 0x30); }
     };
     "answers-global-control" "EN 1" "Global_Control is confirmed." |s, r| {
-        if FrameControl(s.request.fc).function().is_some_and(Function::is_sdn) { r.octets = vec![0xE5]; }
+        if FrameControl(s.request.fc).function().is_some_and(FcFunction::is_sdn) { r.octets = vec![0xE5]; }
     };
     "answers-twice" "EN 1" "Each reply is sent twice." |_, r| r.times = 2;
     "answers-too-soon" "EN 1" "A reply begins 3 bits behind the request." |_, r| r.delay = 3;

@@ -88,7 +88,7 @@ events! {
 
 /// A cell: what happened, and in which state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Cell {
+pub(super) struct DpCell {
     pub(super) state: State,
     pub(super) event: Event,
 }
@@ -96,7 +96,7 @@ pub(super) struct Cell {
 /// How many cells there are, those that nothing can reach included.
 pub const CELLS: usize = STATES * Event::ALL.len();
 
-impl Cell {
+impl DpCell {
     /// Its number, below [`CELLS`].
     pub(super) fn index(self) -> usize {
         self.state.index() * Event::ALL.len() + self.event as usize
@@ -142,8 +142,8 @@ mod tests {
 
     #[test]
     fn every_cell_has_a_number_of_its_own() {
-        let numbers: BTreeSet<_> = Cell::reachable().map(Cell::index).collect();
-        assert_eq!(numbers.len(), Cell::reachable().count());
+        let numbers: BTreeSet<_> = DpCell::reachable().map(DpCell::index).collect();
+        assert_eq!(numbers.len(), DpCell::reachable().count());
         assert!(numbers.iter().all(|number| *number < CELLS));
         for number in 0..STATES {
             assert_eq!(State::numbered(number).index(), number);

@@ -18,7 +18,7 @@ pub use pkw::pkw;
 pub use slave::{slave, slave_counted};
 
 use crate::fuzz::{FuzzTarget, InputPieces, Noting};
-use cells::Cell;
+use cells::DpCell;
 
 /// Every target whose body is here.
 pub const TARGETS: [FuzzTarget; 4] = [
@@ -37,7 +37,7 @@ pub const NOTING: [Noting; 4] = [
             head: 1,
             record: 12,
         },
-        of: Some(|| Cell::reachable().count()),
+        of: Some(|| DpCell::reachable().count()),
     },
     Noting {
         name: "nordac-pkw",

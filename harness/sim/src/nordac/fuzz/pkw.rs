@@ -52,10 +52,10 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
 
 /// An open point with its last word; a number out of range leaves all defaults.
 fn properties(number: u8) -> Properties {
-    use harness_proto::nordac::properties::Accepts;
+    use harness_proto::nordac::properties::Choices;
     let mut properties = Properties::default();
     if let Some(property) = PROPERTIES.get(usize::from(number))
-        && let Accepts::Words(words) = property.accepts
+        && let Choices::Words(words) = property.accepts
         && let Some(word) = words.last()
     {
         assert!(property.set(&mut properties, word), "{}", property.name);

@@ -1,6 +1,6 @@
 //! Telegrams, waits and faults for one drive, beside the reference model of its module.
 
-use super::cells::{Cell, Event, State};
+use super::cells::{DpCell, Event, State};
 use super::heard::TelegramEffect;
 use super::telegrams::{ADDRESS, any_telegram, octets, parameters, telegram};
 use crate::fuzz::{LONGEST, Notebook};
@@ -10,7 +10,7 @@ use crate::octet_segment::LineStation;
 use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::line::{LineError, Received};
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Accepts, PROPERTIES, Properties};
+use harness_proto::nordac::properties::{Choices, PROPERTIES, Properties};
 use harness_proto::nordac::words::{State as DriveState, stw};
 use harness_proto::profibus::dp::DpState;
 use harness_proto::profibus::{Buffer, BusRate};
@@ -44,7 +44,7 @@ const WAITS: [u64; 16] = [
 
 /// One operation: what, how it is sent, its data, and the time after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Operation {
+struct SlaveStep {
     what: u8,
     /// Bit 0: from master 3; bits 3, 2: 2 first request, 3 without count, 0 and 1 the next; bits 5, 4: 3 damaged; bits 7, 6: 3 to the address
     /// in data byte 8.
@@ -53,7 +53,7 @@ struct Operation {
     wait: u8,
 }
 
-impl<'a> Arbitrary<'a> for Operation {
+impl<'a> Arbitrary<'a> for SlaveStep {
     /// Twelve bytes. The first one chooses: 0 to 6 a Data_Exchange with a usual word, 7 with any word, 8 one of another length; 9 Set_Prm, 10 Chk_Cfg, 11 both as
     /// a master starts; 12 a service that reads, 13 Global_Control; 14 the last telegram again; 15 any telegram; 16 the link, a fault, or time.
     fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
@@ -87,8 +87,8 @@ static VARIANTS: LazyLock<Vec<SlavePair>> = LazyLock::new(|| {
     let mut all = vec![Properties::default()];
     for property in PROPERTIES {
         let words: Vec<String> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(|&word| word.to_owned()).collect(),
-            Accepts::Count { least, default, .. } => {
+            Choices::Words(words) => words.iter().skip(1).map(|&word| word.to_owned()).collect(),
+            Choices::Count { least, default, .. } => {
                 [least, default + 1].iter().map(u8::to_string).collect()
             }
         };
@@ -134,14 +134,14 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     });
 }
 
-fn watched(data: &[u8], reached: &mut impl FnMut(Cell)) {
+fn watched(data: &[u8], reached: &mut impl FnMut(DpCell)) {
     let Some((&variant, data)) = data.split_first() else {
         return;
     };
     let mut pair = VARIANTS[usize::from(variant) % VARIANTS.len()].clone();
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);
     for _ in 0..MOST {
-        let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<Operation>()) else {
+        let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<SlaveStep>()) else {
             break;
         };
         pair.happens(&operation, reached);
@@ -178,8 +178,8 @@ impl SlavePair {
         }
     }
 
-    fn happens(&mut self, operation: &Operation, reached: &mut impl FnMut(Cell)) {
-        let Operation { what, data, .. } = *operation;
+    fn happens(&mut self, operation: &SlaveStep, reached: &mut impl FnMut(DpCell)) {
+        let SlaveStep { what, data, .. } = *operation;
         let [a, b, c, ..] = data;
         match what {
             0..=8 => self.send(operation, None, &self.outputs(what, &data), reached),
@@ -237,7 +237,7 @@ impl SlavePair {
         }
     }
 
-    fn control(&mut self, operation: &Operation, reached: &mut impl FnMut(Cell)) {
+    fn control(&mut self, operation: &SlaveStep, reached: &mut impl FnMut(DpCell)) {
         let [command, group, more, ..] = operation.data;
         let all = [command, group, more];
         let data = if more == 0xFF { &all[..] } else { &all[..2] };
@@ -253,10 +253,10 @@ impl SlavePair {
     /// SRD with the count that belongs to it.
     fn send(
         &mut self,
-        operation: &Operation,
+        operation: &SlaveStep,
         sap: Option<u8>,
         data: &[u8],
-        reached: &mut impl FnMut(Cell),
+        reached: &mut impl FnMut(DpCell),
     ) {
         let (upper, next) = match operation.how >> 2 & 3 {
             2 => (0x60, 0x50),
@@ -274,13 +274,18 @@ impl SlavePair {
         self.transmit(&octets, operation, reached);
     }
 
-    fn transmit(&mut self, octets: &Buffer, operation: &Operation, reached: &mut impl FnMut(Cell)) {
+    fn transmit(
+        &mut self,
+        octets: &Buffer,
+        operation: &SlaveStep,
+        reached: &mut impl FnMut(DpCell),
+    ) {
         let damage = (operation.how >> 4 & 3 == 3).then_some(operation.data[7]);
         self.telegram(octets, damage, reached);
     }
 
     /// A telegram to both, and both must answer the same at the same time.
-    fn telegram(&mut self, octets: &Buffer, damage: Option<u8>, reached: &mut impl FnMut(Cell)) {
+    fn telegram(&mut self, octets: &Buffer, damage: Option<u8>, reached: &mut impl FnMut(DpCell)) {
         let start = self.now + RATE.bit_time() * 33;
         let end = start + RATE.octet_time() * octets.len() as u64;
         self.pass(end, reached);
@@ -323,12 +328,12 @@ impl SlavePair {
             executed: self.reference.executed(),
         };
         for event in heard.events(expected) {
-            reached(Cell { state, event });
+            reached(DpCell { state, event });
         }
         self.last = *octets;
     }
 
-    fn world(&mut self, a: u8, b: u8, reached: &mut impl FnMut(Cell)) {
+    fn world(&mut self, a: u8, b: u8, reached: &mut impl FnMut(DpCell)) {
         let state = State::of(&self.drive);
         let event = match a % 6 {
             0 | 1 => {
@@ -349,10 +354,10 @@ impl SlavePair {
             }
             _ => return self.wait(Span::from_millis(u64::from(b) * 10), reached),
         };
-        reached(Cell { state, event });
+        reached(DpCell { state, event });
     }
 
-    fn wait(&mut self, time: Span, reached: &mut impl FnMut(Cell)) {
+    fn wait(&mut self, time: Span, reached: &mut impl FnMut(DpCell)) {
         if time != Span::ZERO {
             self.now += time;
             self.pass(self.now, reached);
@@ -360,7 +365,7 @@ impl SlavePair {
     }
 
     /// Time passes until `to`, event by event.
-    fn pass(&mut self, to: Instant, reached: &mut impl FnMut(Cell)) {
+    fn pass(&mut self, to: Instant, reached: &mut impl FnMut(DpCell)) {
         let mut quiet = true;
         while let Some(next) = self.drive.next_action().filter(|next| *next <= to) {
             let (state, faults) = (State::of(&self.drive), self.faults());
@@ -376,14 +381,14 @@ impl SlavePair {
             ];
             for (_, event) in events.into_iter().filter(|(happened, _)| *happened) {
                 quiet = false;
-                reached(Cell { state, event });
+                reached(DpCell { state, event });
             }
         }
         self.drive.advance(to);
         self.reference.advance(to);
         if quiet {
             let state = State::of(&self.drive);
-            reached(Cell {
+            reached(DpCell {
                 state,
                 event: Event::Quiet,
             });
@@ -426,7 +431,7 @@ impl SlavePair {
     }
 }
 
-fn master(operation: &Operation) -> u8 {
+fn master(operation: &SlaveStep) -> u8 {
     2 + (operation.how & 1)
 }
 
@@ -498,13 +503,13 @@ mod tests {
     fn a_difference_is_found() {
         let mut pair = VARIANTS[0].clone();
         pair.drive.inverter_mut().set_cause(Instant::START, Some(3));
-        let start = Operation {
+        let start = SlaveStep {
             what: 11,
             how: 0,
             data: [0; 9],
             wait: 0,
         };
         pair.happens(&start, &mut |_| {});
-        pair.happens(&Operation { what: 0, ..start }, &mut |_| {});
+        pair.happens(&SlaveStep { what: 0, ..start }, &mut |_| {});
     }
 }

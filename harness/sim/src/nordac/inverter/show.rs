@@ -2,7 +2,7 @@
 
 use super::super::frequency::Frequency;
 use super::super::ramp::Course;
-use super::{Inputs, Inverter};
+use super::{Inverter, InverterInputs};
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::pkw::Index;
@@ -23,9 +23,9 @@ const BUS_MODE_32: i32 = 3;
 impl Inverter {
     /// The process words of a reply at `at`, to which the time must have advanced.
     #[must_use]
-    pub fn inputs(&self, at: Instant) -> Inputs {
+    pub fn inputs(&self, at: Instant) -> InverterInputs {
         let frequency = self.ramp.at(at);
-        Inputs {
+        InverterInputs {
             zsw: self.status(frequency),
             hiw: self.main_actual_value(frequency),
             pzd3: 0,

@@ -5,10 +5,10 @@ mod invariants;
 mod open;
 mod words;
 
-use super::{Inputs, Inverter, Outputs};
+use super::{Inverter, InverterInputs, Outputs};
 use crate::nordac::InverterSetup;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Description, Properties};
+use harness_proto::nordac::properties::{NordacProperty, Properties};
 use harness_proto::nordac::words::State;
 use harness_proto::nordac::{Parameter, Pkw, PpoType};
 use harness_proto::time::{Instant, Span};
@@ -111,7 +111,7 @@ impl Bench {
         self
     }
 
-    fn inputs(&self) -> Inputs {
+    fn inputs(&self) -> InverterInputs {
         self.inverter.inputs(self.now)
     }
 
@@ -151,7 +151,7 @@ impl Bench {
 fn properties(name: &str, word: &str) -> Properties {
     let mut properties = Properties::default();
     let description =
-        Description::of(name).unwrap_or_else(|| panic!("there is no property {name}"));
+        NordacProperty::of(name).unwrap_or_else(|| panic!("there is no property {name}"));
     assert!(description.set(&mut properties, word), "{name} = {word}");
     properties
 }

@@ -7,12 +7,12 @@ const MOST: usize = 40;
 
 /// Octets of a telegram or of its data.
 #[derive(Clone, Copy, Debug)]
-pub struct Bytes {
+pub struct OctetList {
     octets: [u8; MOST],
     len: usize,
 }
 
-impl Bytes {
+impl OctetList {
     /// As many zeros.
     pub(super) fn zeros(len: usize) -> Self {
         assert!(len <= MOST, "{len} octets");
@@ -37,7 +37,7 @@ impl Bytes {
     }
 }
 
-impl Deref for Bytes {
+impl Deref for OctetList {
     type Target = [u8];
     fn deref(&self) -> &[u8] {
         &self.octets[..self.len]

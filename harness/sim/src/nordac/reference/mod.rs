@@ -4,6 +4,6 @@ mod bytes;
 pub mod inverter;
 pub mod slave;
 
-pub use bytes::Bytes;
+pub use bytes::OctetList;
 pub use inverter::ReferenceInverter;
 pub use slave::ReferenceSlave;

@@ -2,7 +2,7 @@
 //!
 //! It knows whole telegrams and no octets on a line. Behind it stands an inverter of its own.
 
-use super::bytes::Bytes;
+use super::bytes::OctetList;
 use crate::nordac::InverterSetup;
 use crate::nordac::inverter::{Inverter, Outputs};
 use harness_proto::nordac::properties::Properties;
@@ -25,9 +25,9 @@ enum ServiceReply {
     /// E5.
     Sc,
     /// SD2 with SAPs.
-    Data(Bytes),
+    Data(OctetList),
     /// SD2 without SAPs; "data" or "data, and a diagnosis waits".
-    Inputs(Bytes),
+    Inputs(OctetList),
 }
 
 /// A request, taken apart.
@@ -52,7 +52,7 @@ pub struct ReferenceSlave {
     state: char,
     /// SA and FCB of the last new request, and its reply.
     record: Option<(u8, bool)>,
-    last: Option<Bytes>,
+    last: Option<OctetList>,
     master: Option<u8>,
     /// Its time, and when it expires.
     watchdog: Option<(Span, Instant)>,
@@ -62,14 +62,14 @@ pub struct ReferenceSlave {
     freeze_allowed: bool,
     group: u8,
     synced: bool,
-    waiting: Option<Bytes>,
-    frozen: Option<Bytes>,
-    outputs: Bytes,
+    waiting: Option<OctetList>,
+    frozen: Option<OctetList>,
+    outputs: OctetList,
     task: Pkw,
     shown: Option<(Pkw, Answer)>,
     due: Option<(u8, Pkw, Answer)>,
     /// The inputs at which inverter and module have lost each other.
-    apart: Option<Bytes>,
+    apart: Option<OctetList>,
     diagnosis_waits: bool,
     /// Bits from a request to its reply.
     delay: u64,
@@ -103,7 +103,7 @@ impl ReferenceSlave {
             synced: false,
             waiting: None,
             frozen: None,
-            outputs: Bytes::zeros(settings.ppo.octets()),
+            outputs: OctetList::zeros(settings.ppo.octets()),
             task: Pkw::default(),
             shown: None,
             due: None,
@@ -176,7 +176,7 @@ impl ReferenceSlave {
     }
 
     /// A telegram without gaps and parity errors has ended at `at`: the octets of the reply.
-    pub fn telegram(&mut self, at: Instant, octets: &[u8]) -> Option<Bytes> {
+    pub fn telegram(&mut self, at: Instant, octets: &[u8]) -> Option<OctetList> {
         self.advance(at);
         self.executed = None;
         self.repeated = false;
@@ -205,7 +205,7 @@ impl ReferenceSlave {
     }
 
     /// A request that is answered once, however often it comes.
-    fn counted(&mut self, at: Instant, request: &Request<'_>) -> Bytes {
+    fn counted(&mut self, at: Instant, request: &Request<'_>) -> OctetList {
         let sends = matches!(request.fc & 0x0F, 0xC | 0xD);
         if sends && self.master == Some(request.sa) {
             self.feed_watchdog(at);
@@ -226,14 +226,14 @@ impl ReferenceSlave {
         };
         let octets = match reply {
             ServiceReply::Rs => self.short(request.sa, 3),
-            ServiceReply::Sc => Bytes::of(&[&[0xE5]]),
+            ServiceReply::Sc => OctetList::of(&[&[0xE5]]),
             ServiceReply::Inputs(data) => {
                 let fc = if self.diagnosis_waits { 0x0A } else { 0x08 };
                 long(request.sa, self.address, fc, &data)
             }
             ServiceReply::Data(data) => {
                 let saps = [request.ssap.unwrap_or(0), request.dsap.unwrap_or(0)];
-                let all = Bytes::of(&[&saps, &data]);
+                let all = OctetList::of(&[&saps, &data]);
                 long(request.sa | 0x80, self.address | 0x80, 0x08, &all)
             }
         };
@@ -276,7 +276,7 @@ impl ReferenceSlave {
             (Some(SET_PRM), _) => self.set_prm(at, sa, data),
             (Some(CHK_CFG), _) => self.chk_cfg(of_master, data),
             _ if !data.is_empty() => ServiceReply::Rs,
-            (Some(GET_CFG), _) => ServiceReply::Data(Bytes::of(&[self.ppo.cfg()])),
+            (Some(GET_CFG), _) => ServiceReply::Data(OctetList::of(&[self.ppo.cfg()])),
             (Some(SLAVE_DIAG), _) => ServiceReply::Data(self.slave_diag(of_master)),
             (Some(RD_INP), _) if exchanges => ServiceReply::Data(self.read_inputs(at)),
             (Some(RD_OUTP), _) if exchanges => ServiceReply::Data(self.outputs),
@@ -360,13 +360,13 @@ impl ReferenceSlave {
 
     fn forget_data(&mut self) {
         self.waiting = None;
-        self.outputs = Bytes::zeros(self.ppo.octets());
+        self.outputs = OctetList::zeros(self.ppo.octets());
         self.task = Pkw::default();
         self.shown = None;
         self.due = None;
     }
 
-    fn slave_diag(&mut self, of_master: bool) -> Bytes {
+    fn slave_diag(&mut self, of_master: bool) -> OctetList {
         if of_master || self.p.diag_flag_cleared_by.word() == "any-master" {
             self.diagnosis_waits = false;
         }
@@ -383,7 +383,7 @@ impl ReferenceSlave {
             | bit(self.synced, 5);
         let master = self.master.unwrap_or(0xFF);
         let block: &[u8] = if extended { &[0x02, 0x04] } else { &[] };
-        Bytes::of(&[&[first, second, 0, master, 0x75, 0x31], block])
+        OctetList::of(&[&[first, second, 0, master, 0x75, 0x31], block])
     }
 
     fn exchange(&mut self, at: Instant, data: &[u8]) -> ServiceReply {
@@ -407,7 +407,7 @@ impl ReferenceSlave {
             (None, None) => self.live(at),
         };
         if self.synced {
-            self.waiting = Some(Bytes::of(&[data]));
+            self.waiting = Some(OctetList::of(&[data]));
         } else {
             self.put_out(at, data);
         }
@@ -416,7 +416,7 @@ impl ReferenceSlave {
 
     /// Outputs become effective.
     fn put_out(&mut self, at: Instant, data: &[u8]) {
-        self.outputs = Bytes::of(&[data]);
+        self.outputs = OctetList::of(&[data]);
         if self.apart.is_some() {
             return;
         }
@@ -450,8 +450,8 @@ impl ReferenceSlave {
     }
 
     /// The inputs as they are now.
-    fn live(&self, at: Instant) -> Bytes {
-        let mut all = Bytes::zeros(0);
+    fn live(&self, at: Instant) -> OctetList {
+        let mut all = OctetList::zeros(0);
         if self.ppo.has_pkw() {
             let answer = self.shown.map_or(Pkw::default(), |(task, answer)| {
                 let now = match answer {
@@ -472,7 +472,7 @@ impl ReferenceSlave {
         all
     }
 
-    fn read_inputs(&self, at: Instant) -> Bytes {
+    fn read_inputs(&self, at: Instant) -> OctetList {
         match (&self.frozen, &self.apart) {
             (Some(frozen), _) if self.p.rd_inp_under_freeze.word() == "frozen" => *frozen,
             (_, Some(kept)) => *kept,
@@ -489,7 +489,7 @@ impl ReferenceSlave {
         let has = |bit: u8| command & bit != 0;
         if has(0x02) {
             self.waiting = None;
-            self.put_out(at, &Bytes::zeros(self.ppo.octets()));
+            self.put_out(at, &OctetList::zeros(self.ppo.octets()));
         }
         if has(0x04) {
             self.frozen = None;
@@ -515,16 +515,16 @@ impl ReferenceSlave {
     }
 
     /// SD1 to `sa`.
-    fn short(&self, sa: u8, fc: u8) -> Bytes {
+    fn short(&self, sa: u8, fc: u8) -> OctetList {
         let sum = sa.wrapping_add(self.address).wrapping_add(fc);
-        Bytes::of(&[&[0x10, sa, self.address, fc, sum, 0x16]])
+        OctetList::of(&[&[0x10, sa, self.address, fc, sum, 0x16]])
     }
 }
 
 /// SD2.
-fn long(da: u8, sa: u8, fc: u8, data: &[u8]) -> Bytes {
+fn long(da: u8, sa: u8, fc: u8, data: &[u8]) -> OctetList {
     let length = data.len() as u8 + 3;
-    let mut all = Bytes::of(&[&[0x68, length, length, 0x68, da, sa, fc], data]);
+    let mut all = OctetList::of(&[&[0x68, length, length, 0x68, da, sa, fc], data]);
     let sum = all[4..]
         .iter()
         .fold(0_u8, |sum, octet| sum.wrapping_add(*octet));

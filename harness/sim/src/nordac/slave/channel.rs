@@ -14,7 +14,7 @@ struct ExecutedTask {
 
 /// The parameter channel of a slave.
 #[derive(Clone, Debug, Default, Hash)]
-pub(super) struct Channel {
+pub(super) struct PkwChannel {
     /// What the last exchange has brought.
     last: Pkw,
     /// The task whose answer is shown.
@@ -23,7 +23,7 @@ pub(super) struct Channel {
     due: Option<(ExecutedTask, u8)>,
 }
 
-impl Channel {
+impl PkwChannel {
     /// An exchange begins: an answer that is due with it is shown from now on.
     pub(super) fn turn(&mut self) {
         if let Some((executed, exchanges)) = &mut self.due {

@@ -1,7 +1,7 @@
 //! The process image of a slave: inputs and outputs, Sync and Freeze (EN 2, NORDAC 3.1).
 
-use super::super::inverter::{Inputs, Inverter, Outputs};
-use super::channel::Channel;
+use super::super::inverter::{Inverter, InverterInputs, Outputs};
+use super::channel::PkwChannel;
 use super::{Outcome, Slave};
 use harness_proto::nordac::Image;
 use harness_proto::nordac::properties::{LeaveDxWrongLength, RdInpUnderFreeze, SyncWithoutRequest};
@@ -12,7 +12,7 @@ use harness_proto::time::Instant;
 /// Inputs and outputs, and what Sync and Freeze keep of them.
 #[derive(Clone, Debug, Default, Hash)]
 pub(super) struct ProcessData {
-    channel: Channel,
+    channel: PkwChannel,
     /// The outputs that are effective.
     outputs: Image,
     /// The outputs that wait for the next Sync or Unsync.
@@ -21,13 +21,13 @@ pub(super) struct ProcessData {
     /// The inputs of the last Freeze.
     frozen: Option<Image>,
     /// Process words of former exchanges, the oldest first, where replies show these.
-    former: Vec<Inputs>,
+    former: Vec<InverterInputs>,
 }
 
 impl ProcessData {
     /// Data_Exch begins: task and answer are zero.
     pub(super) fn start(&mut self) {
-        self.channel = Channel::default();
+        self.channel = PkwChannel::default();
         self.outputs = Image::default();
         self.stored = None;
         self.former.clear();
@@ -158,6 +158,6 @@ impl Slave {
 }
 
 /// The process words of a reply: PZD5 and PZD6 are 0.
-const fn words(inputs: Inputs) -> [u16; 6] {
+const fn words(inputs: InverterInputs) -> [u16; 6] {
     [inputs.zsw, inputs.hiw, inputs.pzd3, inputs.pzd4, 0, 0]
 }

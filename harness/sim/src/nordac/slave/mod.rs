@@ -18,7 +18,7 @@ use harness_proto::nordac::properties::{
 };
 use harness_proto::nordac::{Image, PpoType};
 use harness_proto::profibus::dp::{DpState, GlobalControl, Service};
-use harness_proto::profibus::fdl::{BROADCAST, Fcb, Form, FrameControl, Function, Pdu, Status};
+use harness_proto::profibus::fdl::{BROADCAST, FcFunction, FcStatus, Fcb, Form, FrameControl, Pdu};
 use harness_proto::profibus::rate::MIN_TSDR_BITS;
 use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
@@ -209,9 +209,9 @@ impl Slave {
         if !addressed {
             return None;
         }
-        if function == Function::FdlStatus {
+        if function == FcFunction::FdlStatus {
             let plain = pdu.form() == Form::Plain;
-            return plain.then(|| self.plain(pdu, Status::Ok)).flatten();
+            return plain.then(|| self.plain(pdu, FcStatus::Ok)).flatten();
         }
         if function.is_srd() && self.is_own_master(pdu.sa()) {
             self.restart_watchdog(at);
@@ -223,7 +223,7 @@ impl Slave {
             let outcome = self.serve(at, pdu, inverter);
             self.reply(pdu, outcome)
         } else if self.properties.sda_ident_lsap == SdaIdentLsap::Rs {
-            self.plain(pdu, Status::Rs)
+            self.plain(pdu, FcStatus::Rs)
         } else {
             None
         };
@@ -298,10 +298,10 @@ impl Slave {
     fn reply(&self, request: &Pdu, outcome: Outcome) -> Option<Buffer> {
         let (status, data) = match outcome {
             Outcome::Confirmed => return Some(Telegram::Confirmation.encode()),
-            Outcome::Refused => return self.plain(request, Status::Rs),
-            Outcome::Data(data) => (Status::DataLow, data),
-            Outcome::Inputs(data) if self.diagnosis_waits => (Status::DataHigh, data),
-            Outcome::Inputs(data) => (Status::DataLow, data),
+            Outcome::Refused => return self.plain(request, FcStatus::Rs),
+            Outcome::Data(data) => (FcStatus::DataLow, data),
+            Outcome::Inputs(data) if self.diagnosis_waits => (FcStatus::DataHigh, data),
+            Outcome::Inputs(data) => (FcStatus::DataLow, data),
         };
         let pdu = Pdu::with_saps(
             request.sa(),
@@ -315,7 +315,7 @@ impl Slave {
     }
 
     /// A reply without data.
-    fn plain(&self, request: &Pdu, status: Status) -> Option<Buffer> {
+    fn plain(&self, request: &Pdu, status: FcStatus) -> Option<Buffer> {
         let control = FrameControl::reply(status);
         let pdu = Pdu::new(request.sa(), self.address(), control, &[]);
         pdu.ok().as_ref().map(Pdu::encode)

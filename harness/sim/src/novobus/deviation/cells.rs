@@ -4,7 +4,7 @@ use super::how::{Deviation, How, Moment, Write, behind_the_bus, wrong};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::{own, ram};
-use harness_proto::novobus::bus_end::{Parameter, Place};
+use harness_proto::novobus::bus_end::{ParameterByte, Place};
 use harness_proto::novobus::command::{Field, Kind};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::memory::{Memory, in_range};
@@ -438,20 +438,20 @@ fn becomes_80(m: &Moment) -> bool {
 }
 
 /// A command whose checking byte has just been refused.
-fn refused(m: &Moment) -> Option<Parameter> {
+fn refused(m: &Moment) -> Option<ParameterByte> {
     let detected = m.step.marks.contains(Marks::DETECTED);
     m.parameter()
         .filter(|p| detected && p.field == Field::Check && m.received.error.is_none())
 }
 
 /// A command whose checking byte was right.
-fn executed(m: &Moment) -> Option<Parameter> {
+fn executed(m: &Moment) -> Option<ParameterByte> {
     let detected = m.step.marks.contains(Marks::DETECTED);
     m.parameter()
         .filter(|p| !detected && p.field == Field::Check)
 }
 
-fn change_bits(p: &Parameter, address: u16, memory: &mut dyn Memory) {
+fn change_bits(p: &ParameterByte, address: u16, memory: &mut dyn Memory) {
     let old = memory.read(address);
     match p.kind {
         Kind::And => memory.write(address, old & p.data[0]),

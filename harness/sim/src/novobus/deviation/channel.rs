@@ -2,7 +2,7 @@
 
 use super::how::{Deviation, How, wrong};
 use harness_proto::nd21::{PARAMETER_COUNT, PARAMETERS};
-use harness_proto::novobus::bus_end::{Parameter, Place};
+use harness_proto::novobus::bus_end::{ParameterByte, Place};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Field, Kind, Reply};
 use harness_proto::novobus::error_mode::Marks;
@@ -99,7 +99,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         "its answer to ReadLong has 00 for the last two bytes",
         How::Says(|m, byte| {
             Some(match m.parameter() {
-                Some(Parameter {
+                Some(ParameterByte {
                     kind: Kind::ReadLong,
                     reply: Reply::Data(2 | 3),
                     ..
@@ -129,7 +129,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         "10.1",
         "it takes any byte for the fixed ones of a command",
         How::Hears(|m| match m.parameter() {
-            Some(Parameter {
+            Some(ParameterByte {
                 field: Field::Fixed(right),
                 ..
             }) => m.good(right),
@@ -141,7 +141,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         "10.2",
         "it executes WriteByte with the address, before the checking byte",
         How::Acts(|m, memory| {
-            if let Some(Parameter {
+            if let Some(ParameterByte {
                 kind: Kind::WriteByte,
                 field: Field::AddrH,
                 address,
@@ -241,7 +241,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         "10.4",
         "it takes codes above 03 for those of their two lowest bits",
         How::Hears(|m| match m.parameter() {
-            Some(Parameter {
+            Some(ParameterByte {
                 field: Field::Code, ..
             }) => m.good(m.received.byte & 3),
             _ => m.received,

@@ -3,7 +3,7 @@
 use super::{behind, cells, channel, errors, numbered, recovery, telegram};
 use crate::deviation::{self, DeviationTable};
 use harness_proto::line::{LineError, Received};
-use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Reaction};
+use harness_proto::novobus::bus_end::{Deadline, ParameterByte, Place, Reaction};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Field, Kind, Reply};
 use harness_proto::novobus::error::BusError;
@@ -140,7 +140,7 @@ impl Moment {
     }
 
     /// What it is in a command begun.
-    pub(super) fn parameter(&self) -> Option<Parameter> {
+    pub(super) fn parameter(&self) -> Option<ParameterByte> {
         match self.place {
             Place::Parameter(parameter) => Some(parameter),
             _ => None,

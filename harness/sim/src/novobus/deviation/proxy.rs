@@ -1,7 +1,7 @@
 //! The memory as a deviant drive's bus end finds it.
 
 use super::how::{Deviation, How, Write};
-use harness_proto::novobus::bus_end::{Parameter, Place};
+use harness_proto::novobus::bus_end::{ParameterByte, Place};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
@@ -36,7 +36,7 @@ impl Memory for Proxy<'_> {
         }
         let mut data = seen(self.deviations, &mut |a| self.memory.read(a), from);
         for deviation in self.deviations {
-            if let (How::Misreads(other), Place::Parameter(Parameter { kind, .. })) =
+            if let (How::Misreads(other), Place::Parameter(ParameterByte { kind, .. })) =
                 (&deviation.injection.how, self.place)
                 && kind.reads()
             {

@@ -1,6 +1,6 @@
 //! Operation lists on the whole ND21: its invariants are debug assertions, so builds for fuzzing have them on.
 
-use super::drive_words::Watch;
+use super::drive_words::DriveWatch;
 use crate::fuzz::LONGEST;
 use crate::fuzz::Notebook;
 use crate::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
@@ -84,7 +84,7 @@ pub fn drive(data: &[u8]) {
 pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let properties = Nd21Properties::default();
     let mut drive = Nd21Drive::new(Properties::default(), properties, factory::eeprom());
-    let mut watch = Watch::new(&drive);
+    let mut watch = DriveWatch::new(&drive);
     let mut now = Instant::START;
     let end = now + MOST_TIME;
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);

@@ -52,11 +52,11 @@ impl Snapshot {
 }
 
 /// An onlooker at a drive.
-pub(super) struct Watch {
+pub(super) struct DriveWatch {
     last: Snapshot,
 }
 
-impl Watch {
+impl DriveWatch {
     pub(super) fn new(drive: &Nd21Drive) -> Self {
         Self {
             last: Snapshot::of(drive),

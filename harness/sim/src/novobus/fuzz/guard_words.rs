@@ -3,7 +3,7 @@
 use super::words;
 use crate::fuzz::{Feature, Notebook};
 use harness_proto::novobus::command::layout;
-use harness_proto::novobus::guard::{Cause, Denial, DriveAct, Guard, Need, Stage};
+use harness_proto::novobus::guard::{Cause, DeniedByte, DriveAct, Guard, Need, Stage};
 use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
 
@@ -18,7 +18,7 @@ pub(super) struct RingByte {
 pub(super) fn note(
     notes: &mut Notebook<'_>,
     heard: &RingByte,
-    admitted: Result<(), Denial>,
+    admitted: Result<(), DeniedByte>,
     guard: &Guard,
 ) {
     if !notes.wanted() {
@@ -31,7 +31,7 @@ pub(super) fn note(
             let (_, behind) = stage(guard.stage());
             notes.note(|| Feature::new(section, place, format!("{event}; then {behind}")));
         }
-        Err(Denial { cause, .. }) => {
+        Err(DeniedByte { cause, .. }) => {
             let why = why(&cause);
             notes.note(|| Feature::new(section, place, format!("{event}; denied, {why}")));
             if let Cause::NotAllowed { act, missing } = cause {

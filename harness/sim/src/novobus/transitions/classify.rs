@@ -5,7 +5,7 @@ use crate::novobus::cells::Cells;
 use harness_proto::line::{LineError, Received};
 use harness_proto::nd21;
 use harness_proto::novobus::address::{ADDRESSED, passed_on};
-use harness_proto::novobus::bus_end::{BusEnd, Parameter, Place, Silent};
+use harness_proto::novobus::bus_end::{BusEnd, ParameterByte, Place, Silent};
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::novobus::command::{Field, Kind, PAGE, layout};
 use harness_proto::novobus::error_mode::{ErrorMode, UPSTREAM_ZEROS};
@@ -100,7 +100,7 @@ fn state_and_good(bus_end: &BusEnd, memory: &Cells, byte: u8) -> (State, Event) 
     }
 }
 
-fn parameter_state(parameter: &Parameter) -> State {
+fn parameter_state(parameter: &ParameterByte) -> State {
     match parameter.field {
         Field::AddrL => State::AddrL,
         Field::AddrH => State::AddrH,
@@ -243,7 +243,7 @@ fn command(byte: u8) -> Event {
     }
 }
 
-fn parameter_byte(parameter: &Parameter, memory: &Cells, byte: u8) -> Event {
+fn parameter_byte(parameter: &ParameterByte, memory: &Cells, byte: u8) -> Event {
     let accepted = match parameter.field {
         Field::Check if byte == parameter.command_sum.plus() => return Event::RightCheck,
         Field::Check => return Event::WrongCheck,

@@ -3,7 +3,7 @@
 use crate::novobus::drive::Drive;
 use crate::novobus::reference::Bytes;
 use harness_proto::nd21::bits::{flags2, hw_version2, selftest, status, sw_version};
-use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
+use harness_proto::nd21::cells::{CellAccess, cell_at, changes_by_itself};
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::{CONFIRM_ERROR, ee, io, ram};
 use std::ops::RangeInclusive;
@@ -26,7 +26,7 @@ static MASTERS: LazyLock<Image> = LazyLock::new(|| {
             _ if [ram::ERRORCODE, ram::ERRORCODE + 1, ram::BUS_ADDR].contains(&address) => 0,
             // Only the bus switches the monitoring of time-outs on or off (14.10.2).
             _ if address == ram::FLAGS2 => flags2::MONITORING,
-            Some(cell) if cell.access != Access::Read && !changes_by_itself(address) => {
+            Some(cell) if cell.access != CellAccess::Read && !changes_by_itself(address) => {
                 !cell.read_only_bits
             }
             _ => 0,
@@ -105,7 +105,7 @@ fn meant(command: &[u8], before: &Image) -> (&'static str, Vec<u16>) {
 
 /// What a cell holds after a write of `data` to it: read-only cells and bits stay as they are (14.2.1).
 fn written(address: u16, before: u8, data: u8) -> u8 {
-    match cell_at(address).filter(|cell| cell.access != Access::Read) {
+    match cell_at(address).filter(|cell| cell.access != CellAccess::Read) {
         Some(cell) => before & cell.read_only_bits | data & !cell.read_only_bits,
         None => before,
     }

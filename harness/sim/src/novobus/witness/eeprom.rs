@@ -3,7 +3,7 @@
 use super::cells::{Image, at};
 use crate::novobus::cells::Cells;
 use crate::novobus::reference::Bytes;
-use harness_proto::nd21::cells::Access;
+use harness_proto::nd21::cells::CellAccess;
 use harness_proto::nd21::{EE_PARAMETERS, PARAMETER_COUNT, PARAMETERS, eeprom, ram};
 
 /// Bit 4 of `EEPROMcontrol`: writing is completed (14.10.5.3).
@@ -72,7 +72,8 @@ pub(super) fn done(job: Job, is: &Image, cells: &Cells) -> Option<Result<(), Str
                 .then(|| format!("{address:02X} was read as {read:02X} and holds {stored:02X}"))
         }
         Job::Write(address, data) => {
-            let free = eeprom::cell_at(address).is_some_and(|cell| cell.access == Access::Write);
+            let free =
+                eeprom::cell_at(address).is_some_and(|cell| cell.access == CellAccess::Write);
             let stored = stands(address);
             let otherwise = free && stored != data;
             otherwise.then(|| format!("{address:02X} holds {stored:02X}, {data:02X} was written"))

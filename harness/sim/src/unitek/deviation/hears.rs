@@ -1,6 +1,6 @@
 //! Drives that read something else out of frames than the manual says.
 
-use super::{Deviation, Hearing, How, Injection};
+use super::{CanInjection, Deviation, Hearing, How};
 use crate::deviation::rows;
 use harness_proto::can::{Frame, Id};
 use harness_proto::unitek::frame::STOP;
@@ -8,7 +8,7 @@ use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Access, Data, Register, Request};
 
 /// A row: name, section, what it does, and the frames that the drive hears in place of one.
-pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Hears):
+pub(super) static DEVIATIONS: &[Deviation] = rows! { CanInjection(Hears):
     "answers-remote-frames" "4.4" "A remote frame is answered with STATUS." |h| {
         if h.frame.is_remote() {
             h.instead(Request::Read { register: 0x40 })

@@ -3,17 +3,17 @@
 use crate::deviation::{Deviation, DeviationTable, rows};
 use harness_proto::can::{Frame, Id};
 use harness_proto::time::Instant;
-use harness_proto::unitek::master::{Event, Job, JobId, Master, Options, Refused};
+use harness_proto::unitek::master::{CanMaster, Job, JobNumber, JobRefusal, MasterEvent, Options};
 use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::{Data, Reply, Request};
 use std::collections::VecDeque;
 
 /// A way in which a master breaks the manual, or what section 5 shows of it.
-pub type MasterDeviation = Deviation<MasterInjection>;
+pub type MasterDeviation = Deviation<CanMasterInjection>;
 
 /// How a master is made to deviate.
 #[derive(Clone, Copy)]
-pub struct MasterInjection(How);
+pub struct CanMasterInjection(How);
 
 #[derive(Clone, Copy)]
 enum How {
@@ -40,8 +40,8 @@ fn write(old: Frame, register: u8, value: u16) -> Vec<Frame> {
 }
 
 /// The deviations of a master.
-pub static MASTER_DEVIATIONS: DeviationTable<MasterInjection> = DeviationTable(&[
-    rows! { MasterInjection:
+pub static MASTER_DEVIATIONS: DeviationTable<CanMasterInjection> = DeviationTable(&[
+    rows! { CanMasterInjection:
         "asks-by-remote-frame" "4.4" "A request is sent as a remote frame." Sends |f, r| match r {
             Request::Read { .. } => Frame::remote(f.id(), 3).into_iter().collect(),
             _ => vec![f],
@@ -132,10 +132,10 @@ pub static MASTER_DEVIATIONS: DeviationTable<MasterInjection> = DeviationTable(&
     },
 ]);
 
-/// A master with one deviation, or none. Its interface is that of [`Master`].
+/// A master with one deviation, or none. Its interface is that of [`CanMaster`].
 #[derive(Debug)]
-pub struct DeviantMaster {
-    master: Master,
+pub struct DeviantCanMaster {
+    master: CanMaster,
     deviation: Option<&'static MasterDeviation>,
     rx: u16,
     tx: u16,
@@ -145,7 +145,7 @@ pub struct DeviantMaster {
     asked: Option<u8>,
 }
 
-impl DeviantMaster {
+impl DeviantCanMaster {
     /// A master of the drive that receives on `rx` and sends on `tx`.
     #[must_use]
     pub fn new(
@@ -155,7 +155,7 @@ impl DeviantMaster {
         deviation: Option<&'static MasterDeviation>,
     ) -> Self {
         Self {
-            master: Master::new(rx, tx, options),
+            master: CanMaster::new(rx, tx, options),
             deviation,
             rx,
             tx,
@@ -164,15 +164,15 @@ impl DeviantMaster {
         }
     }
 
-    /// See [`Master::submit`].
+    /// See [`CanMaster::submit`].
     ///
     /// # Errors
-    /// [`Refused`].
-    pub fn submit(&mut self, job: Job) -> Result<JobId, Refused> {
+    /// [`JobRefusal`].
+    pub fn submit(&mut self, job: Job) -> Result<JobNumber, JobRefusal> {
         self.master.submit(job)
     }
 
-    /// See [`Master::poll_transmit`].
+    /// See [`CanMaster::poll_transmit`].
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Frame> {
         if self.ahead.is_empty() {
             let frame = self.master.poll_transmit(now)?;
@@ -191,7 +191,7 @@ impl DeviantMaster {
         self.ahead.pop_front()
     }
 
-    /// See [`Master::handle_frame`].
+    /// See [`CanMaster::handle_frame`].
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         let taken = match (
             self.deviation.map(|deviation| deviation.injection.0),
@@ -205,25 +205,25 @@ impl DeviantMaster {
         }
     }
 
-    /// See [`Master::poll_timeout`].
+    /// See [`CanMaster::poll_timeout`].
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.master.poll_timeout()
     }
 
-    /// See [`Master::handle_timeout`].
+    /// See [`CanMaster::handle_timeout`].
     pub fn handle_timeout(&mut self, now: Instant) {
         self.master.handle_timeout(now);
     }
 
-    /// See [`Master::identifiers`].
+    /// See [`CanMaster::identifiers`].
     #[must_use]
     pub const fn identifiers(&self) -> (u16, u16) {
         self.master.identifiers()
     }
 
-    /// See [`Master::poll_event`].
-    pub fn poll_event(&mut self) -> Option<Event> {
+    /// See [`CanMaster::poll_event`].
+    pub fn poll_event(&mut self) -> Option<MasterEvent> {
         self.master.poll_event()
     }
 }

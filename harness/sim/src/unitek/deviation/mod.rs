@@ -1,14 +1,14 @@
 //! Wrong drives and wrong masters: named deviations from the manual, for tests that must find them.
 //!
 //! A [`Deviant`] wraps a right [`Drive`] and is the only place that injects deviations: it changes the frames before the drive hears
-//! them and those that it sends. The drive itself is unchanged. [`DEVIATIONS`] is the table. [`DeviantMaster`] and
+//! them and those that it sends. The drive itself is unchanged. [`DEVIATIONS`] is the table. [`DeviantCanMaster`] and
 //! [`MASTER_DEVIATIONS`] do the same for the master.
 
 mod hears;
 mod master;
 mod sends;
 
-pub use master::{DeviantMaster, MASTER_DEVIATIONS, MasterDeviation};
+pub use master::{DeviantCanMaster, MASTER_DEVIATIONS, MasterDeviation};
 
 use super::drive::Drive;
 use super::outbox::Waiting;
@@ -22,11 +22,11 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 /// A way in which a drive breaks the manual.
-pub type Deviation = deviation::Deviation<Injection>;
+pub type Deviation = deviation::Deviation<CanInjection>;
 
 /// How a drive is made to deviate.
 #[derive(Clone, Copy)]
-pub struct Injection(How);
+pub struct CanInjection(How);
 
 /// Where it deviates.
 #[derive(Clone, Copy)]
@@ -34,11 +34,11 @@ enum How {
     /// The drive hears these frames in place of the one on the bus.
     Hears(fn(&Hearing<'_>) -> Vec<Frame>),
     /// The drive sends these frames in place of its own.
-    Sends(fn(&Sending<'_>) -> Vec<Frame>),
+    Sends(fn(&SentFrame<'_>) -> Vec<Frame>),
 }
 
 /// The deviations of a drive: those of what it hears, then those of what it sends.
-pub static DEVIATIONS: DeviationTable<Injection> =
+pub static DEVIATIONS: DeviationTable<CanInjection> =
     DeviationTable(&[hears::DEVIATIONS, sends::DEVIATIONS]);
 
 /// Those that depend on how many frames were heard and sent before, and the one that depends on what was first sent.
@@ -133,7 +133,7 @@ impl Hearing<'_> {
 }
 
 /// A frame that a deviant drive sends.
-struct Sending<'a> {
+struct SentFrame<'a> {
     drive: &'a Drive,
     memory: &'a DriveMemory,
     waiting: &'a Waiting,
@@ -141,7 +141,7 @@ struct Sending<'a> {
     tx: u16,
 }
 
-impl Sending<'_> {
+impl SentFrame<'_> {
     fn as_it_is(&self) -> Vec<Frame> {
         vec![self.waiting.frame]
     }
@@ -238,7 +238,7 @@ impl Deviant {
             self.deviation.map(|deviation| deviation.injection.0),
             Reply::decode(&waiting.frame, tx),
         ) {
-            (Some(How::Sends(sends)), Ok(reply)) => sends(&Sending {
+            (Some(How::Sends(sends)), Ok(reply)) => sends(&SentFrame {
                 drive: &self.drive,
                 memory: &self.memory,
                 waiting,

@@ -1,6 +1,6 @@
 //! Drives that send something else than the manual says.
 
-use super::{Deviation, How, Injection};
+use super::{CanInjection, Deviation, How};
 use crate::deviation::rows;
 use crate::unitek::Cause;
 use harness_proto::can::Frame;
@@ -9,7 +9,7 @@ use harness_proto::unitek::words::status;
 use harness_proto::unitek::{Data, Reply};
 
 /// A row: name, section, what it does, and the frames that the drive sends in place of one.
-pub(super) static DEVIATIONS: &[Deviation] = rows! { Injection(Sends):
+pub(super) static DEVIATIONS: &[Deviation] = rows! { CanInjection(Sends):
     "no-stuff-byte" "4.5" "A reply ends with its data: 3 or 5 bytes." |s| s.bytes(|bytes| bytes[..bytes.len() - 1].to_vec());
     "eight-bytes" "4.5" "A reply always has 8 bytes." |s| s.bytes(|bytes| {
         let mut bytes = bytes.to_vec();

@@ -20,7 +20,7 @@ pub(super) enum CycleCount {
 
 /// The state of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct State {
+pub(super) struct CellState {
     /// MODE bit 2.
     pub(super) locked: bool,
     /// MODE bit 4: STATUS is sent when it changes.
@@ -35,7 +35,7 @@ pub(super) struct State {
 /// How many states there are.
 const STATES: usize = 16 * 3;
 
-impl State {
+impl CellState {
     /// The state of a drive.
     #[must_use]
     pub(super) fn of(drive: &Drive) -> Self {
@@ -139,15 +139,15 @@ events! {
 
 /// A cell: what happened, and in which state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Cell {
-    pub(super) state: State,
+pub(super) struct DriveCell {
+    pub(super) state: CellState,
     pub(super) event: Event,
 }
 
 /// How many cells there are, those that nothing can reach included.
 pub const CELLS: usize = STATES * Event::ALL.len();
 
-impl Cell {
+impl DriveCell {
     /// Its number, below [`CELLS`].
     #[must_use]
     pub(super) const fn index(self) -> usize {
@@ -157,7 +157,7 @@ impl Cell {
     /// Whether a drive can reach it.
     #[must_use]
     pub(super) fn is_reachable(self) -> bool {
-        let State {
+        let CellState {
             locked,
             by_event,
             closed,
@@ -181,7 +181,7 @@ impl Cell {
     /// All that can be reached.
     pub(super) fn reachable() -> impl Iterator<Item = Self> {
         let cells = (0..STATES).flat_map(|state| {
-            let state = State::numbered(state);
+            let state = CellState::numbered(state);
             Event::ALL.iter().map(move |&event| Self { state, event })
         });
         cells.filter(|cell| cell.is_reachable())
@@ -201,11 +201,11 @@ mod tests {
 
     #[test]
     fn every_cell_has_a_number_of_its_own() {
-        let numbers: BTreeSet<_> = Cell::reachable().map(Cell::index).collect();
-        assert_eq!(numbers.len(), Cell::reachable().count());
+        let numbers: BTreeSet<_> = DriveCell::reachable().map(DriveCell::index).collect();
+        assert_eq!(numbers.len(), DriveCell::reachable().count());
         assert!(numbers.iter().all(|number| *number < CELLS));
         for number in 0..STATES {
-            assert_eq!(State::numbered(number).index(), number);
+            assert_eq!(CellState::numbered(number).index(), number);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Frames, waits and inputs for one drive, beside the reference model.
 
-use super::cells::{Cell, Event, State};
+use super::cells::{CellState, DriveCell, Event};
 use crate::fuzz::{LONGEST, Notebook};
 use crate::unitek::Drive;
 use crate::unitek::inputs::Inputs;
@@ -23,7 +23,7 @@ const HOMING: Span = Span::from_millis(5);
 
 /// What happens to the drive, and how many milliseconds pass after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Operation {
+struct DriveStep {
     what: DriveOperation,
     wait: u64,
 }
@@ -46,7 +46,7 @@ enum DriveOperation {
     Time(u64),
 }
 
-impl<'a> Arbitrary<'a> for Operation {
+impl<'a> Arbitrary<'a> for DriveStep {
     /// Seven bytes: what, register, four bytes of a value, time. Of the first byte, bits 3 to 0 give the number of data bytes (9 to 11 mean 3,
     /// 12 to 15 mean 5), or which input or value. 00: a frame to the drive; 80: to 201; B0: to the identifier in the value, bit 31 for 29 bits;
     /// C0: a remote frame; D0: an input; E0: a value that is overruled; F0: it is so no longer; FF: a quarter of the first byte
@@ -153,13 +153,13 @@ pub fn drive(data: &[u8]) {
 ///
 /// # Panics
 /// As [`drive`].
-fn drive_watched(data: &[u8], reached: &mut impl FnMut(Cell)) {
+fn drive_watched(data: &[u8], reached: &mut impl FnMut(DriveCell)) {
     let Some((&variant, data)) = data.split_first() else {
         return;
     };
     let mut pair = VARIANTS[usize::from(variant) % VARIANTS.len()].clone();
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);
-    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<Operation>()) {
+    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<DriveStep>()) {
         if pair.now > MOST_TIME {
             break;
         }
@@ -207,7 +207,7 @@ impl Pair {
         Instant::START + Span::from_millis(self.now)
     }
 
-    fn happens(&mut self, what: DriveOperation, reached: &mut impl FnMut(Cell)) {
+    fn happens(&mut self, what: DriveOperation, reached: &mut impl FnMut(DriveCell)) {
         let rx = self.drive.identifiers().0;
         let id = Id::base(rx).or(Id::base(DEFAULT_RX));
         let frame = match (what, id) {
@@ -225,7 +225,7 @@ impl Pair {
         }
     }
 
-    fn switch(&mut self, number: usize, on: bool, reached: &mut impl FnMut(Cell)) {
+    fn switch(&mut self, number: usize, on: bool, reached: &mut impl FnMut(DriveCell)) {
         self.happened(Event::Input, reached);
         if let Some(input) = self.inputs.switch(Inputs::SWITCHES[number]) {
             *input = on;
@@ -233,7 +233,7 @@ impl Pair {
         self.connect();
     }
 
-    fn force(&mut self, number: usize, raw: Option<u32>, reached: &mut impl FnMut(Cell)) {
+    fn force(&mut self, number: usize, raw: Option<u32>, reached: &mut impl FnMut(DriveCell)) {
         let faults = self.inputs.faults;
         let _known = self.inputs.force(Inputs::FORCED[number], raw);
         let event = if self.inputs.faults == faults {
@@ -251,12 +251,12 @@ impl Pair {
     }
 
     /// An event in the present state of the drive.
-    fn happened(&self, event: Event, reached: &mut impl FnMut(Cell)) {
-        let state = State::of(&self.drive);
-        reached(Cell { state, event });
+    fn happened(&self, event: Event, reached: &mut impl FnMut(DriveCell)) {
+        let state = CellState::of(&self.drive);
+        reached(DriveCell { state, event });
     }
 
-    fn frame(&mut self, frame: &Frame, reached: &mut impl FnMut(Cell)) {
+    fn frame(&mut self, frame: &Frame, reached: &mut impl FnMut(DriveCell)) {
         let request = self.drive.reads(frame).map(|(request, _)| request);
         self.happened(self.event(request), reached);
         if let Ok(Request::Write { register, data }) = request
@@ -312,11 +312,11 @@ impl Pair {
     }
 
     /// Time passes, millisecond by millisecond: both models send the same frames.
-    fn wait(&mut self, millis: u64, reached: &mut impl FnMut(Cell)) {
+    fn wait(&mut self, millis: u64, reached: &mut impl FnMut(DriveCell)) {
         if millis == 0 {
             return;
         }
-        let state = State::of(&self.drive);
+        let state = CellState::of(&self.drive);
         let homing = self.drive.is_homing();
         let timed_out = self.drive.register(0x8F) & ERROR_TIME_OUT;
         let mut quiet = true;
@@ -340,7 +340,7 @@ impl Pair {
                     Cause::Cycle(_) => Event::Cyclic,
                     Cause::Event => Event::StatusSent,
                 };
-                reached(Cell { state, event });
+                reached(DriveCell { state, event });
             });
         }
         self.drive.advance(self.at());
@@ -352,7 +352,7 @@ impl Pair {
             (found, Event::TimedOut),
         ];
         for (_, event) in events.into_iter().filter(|(happened, _)| *happened) {
-            reached(Cell { state, event });
+            reached(DriveCell { state, event });
         }
         self.check();
     }
@@ -486,7 +486,7 @@ mod tests {
     #[test]
     fn operations() {
         let operation = |bytes: [u8; 7]| {
-            let read = Operation::arbitrary(&mut Unstructured::new(&bytes));
+            let read = DriveStep::arbitrary(&mut Unstructured::new(&bytes));
             read.expect("seven bytes")
         };
         let read = operation([3, 0x3D, 0x40, 0, 0, 0, 0xC2]);

@@ -7,7 +7,7 @@ use harness_proto::can::{Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{CYCLES, DEFAULT_RX, DEFAULT_TX};
 use harness_proto::unitek::master::{
-    Disturbance, Event, Job, JobId, Master, Options, Outcome, Refused,
+    CanMaster, Disturbance, Job, JobNumber, JobRefusal, MasterEvent, Options, Outcome,
 };
 use harness_proto::unitek::properties::{Dlc4, Properties};
 use harness_proto::unitek::words::MODE_LOCK;
@@ -22,7 +22,7 @@ const MOST_FRAMES: usize = 500;
 
 /// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
-struct Operation {
+struct MasterStep {
     what: MasterOperation,
     wait: Span,
 }
@@ -45,7 +45,7 @@ enum MasterOperation {
     Time,
 }
 
-impl<'a> Arbitrary<'a> for Operation {
+impl<'a> Arbitrary<'a> for MasterStep {
     /// Seven bytes: what, register, four bytes of a value, time in ms. Of the first byte, bits 3 to 0 are the number of data bytes (9 to 11 mean 4,
     /// 12 to 15 mean 6) or the kind of a job. 0_ to 3_: a job; 4_ to 7_: the next frame of a sound drive arrives; 8_: it is lost; 9_: it arrives
     /// twice; A_: a frame with the drive's identifier; B_: with another; C_: with the register that was asked last; D_: a remote frame; E_: the
@@ -126,7 +126,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
         ..Options::default()
     });
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);
-    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<Operation>()) {
+    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<MasterStep>()) {
         play.happens(operation.what, notes);
         play.run_until(play.now + operation.wait, notes);
     }
@@ -144,7 +144,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
 /// A job that has not ended.
 #[derive(Debug)]
 struct Open {
-    id: JobId,
+    id: JobNumber,
     job: Job,
     /// Frames that were sent for it.
     sent: usize,
@@ -155,7 +155,7 @@ struct Open {
 }
 
 struct Play {
-    master: Master,
+    master: CanMaster,
     options: Options,
     drive: Drive,
     now: Instant,
@@ -169,7 +169,7 @@ struct Play {
 impl Play {
     fn new(options: Options) -> Self {
         Self {
-            master: Master::new(DEFAULT_RX, DEFAULT_TX, options),
+            master: CanMaster::new(DEFAULT_RX, DEFAULT_TX, options),
             options,
             drive: Drive::new(Properties::default(), Inputs::default(), Instant::START),
             now: Instant::START,
@@ -238,9 +238,9 @@ impl Play {
             }
             Err(refused) => {
                 let what = match refused {
-                    Refused::Full => "too many wait",
-                    Refused::EightCycles => "eight cycles",
-                    Refused::Interval => "interval",
+                    JobRefusal::Full => "too many wait",
+                    JobRefusal::EightCycles => "eight cycles",
+                    JobRefusal::Interval => "interval",
                 };
                 notes.note(|| Feature::new("5.2", "a job is refused", what));
             }
@@ -371,10 +371,14 @@ impl Play {
     fn events(&mut self, notes: &mut Notebook<'_>) {
         while let Some(event) = self.master.poll_event() {
             match event {
-                Event::Ended { id, outcome } => self.ended(id, outcome, notes),
-                Event::Cyclic { .. } => notes.note(|| Feature::new("5.2", "reported", "cyclic")),
-                Event::Status { .. } => notes.note(|| Feature::new("5.2", "reported", "status")),
-                Event::Disturbance(disturbance) => {
+                MasterEvent::Ended { id, outcome } => self.ended(id, outcome, notes),
+                MasterEvent::Cyclic { .. } => {
+                    notes.note(|| Feature::new("5.2", "reported", "cyclic"))
+                }
+                MasterEvent::Status { .. } => {
+                    notes.note(|| Feature::new("5.2", "reported", "status"))
+                }
+                MasterEvent::Disturbance(disturbance) => {
                     let what = match disturbance {
                         Disturbance::Odd(_) => "odd",
                         Disturbance::Unasked { .. } => "unasked",
@@ -394,7 +398,7 @@ impl Play {
     }
 
     /// Jobs end in their order, once, and as what they are.
-    fn ended(&mut self, id: JobId, outcome: Outcome, notes: &mut Notebook<'_>) {
+    fn ended(&mut self, id: JobNumber, outcome: Outcome, notes: &mut Notebook<'_>) {
         let Some(open) = self.open.pop_front() else {
             panic!("a job ended that was not open: {outcome:?}");
         };

@@ -18,7 +18,7 @@ pub use master::master;
 pub use segment::segment;
 
 use crate::fuzz::{FuzzTarget, InputPieces, Noting};
-use cells::Cell;
+use cells::DriveCell;
 
 /// Every target whose body is here.
 pub const TARGETS: [FuzzTarget; 4] = [
@@ -40,7 +40,7 @@ pub const NOTING: [Noting; 4] = [
         name: "unitek-drive",
         body: drive::noted,
         pieces: InputPieces::Bytes { head: 1, record: 7 },
-        of: Some(|| Cell::reachable().count()),
+        of: Some(|| DriveCell::reachable().count()),
     },
     Noting {
         name: "unitek-segment",

@@ -27,7 +27,7 @@ const HOSTS: usize = 2;
 
 /// What happens, and how much time passes after it.
 #[derive(Clone, Copy, Debug)]
-struct Operation {
+struct SegmentStep {
     what: SegmentAct,
     wait: Span,
 }
@@ -48,7 +48,7 @@ enum SegmentAct {
     Time,
 }
 
-impl<'a> Arbitrary<'a> for Operation {
+impl<'a> Arbitrary<'a> for SegmentStep {
     /// Seven bytes: what, four operands, an operand, time. Of the first byte, bits 3 to 0 are the number of data bytes (9 to 11 mean 3, 12 to 15
     /// mean 5). 0_ to 9_: a frame (bit 4: the host; above: the drive); A_: a frame for no drive; B_: a fault; C_: an input; D_: the controller
     /// of a host is restarted; E_, F_: time.
@@ -127,7 +127,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let mut case = Case::new(RATES[usize::from(rate) % RATES.len()]);
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);
     let end = Instant::START + MOST_TIME;
-    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<Operation>()) {
+    while let (false, Ok(operation)) = (input.is_empty(), input.arbitrary::<SegmentStep>()) {
         case.happens(operation.what);
         if operation.wait > Span::ZERO {
             case.now += operation.wait;

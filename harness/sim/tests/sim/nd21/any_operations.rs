@@ -4,7 +4,7 @@
 
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, ps_status, scope_status};
-use harness_proto::nd21::cells::{Access, RAM, cell_at};
+use harness_proto::nd21::cells::{CellAccess, RAM, cell_at};
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;
@@ -137,8 +137,8 @@ fn properties() -> impl Strategy<Value = Nd21Properties> {
 /// ND21 14.2.1: a write changes neither a read-only cell nor a read-only bit.
 fn write(drive: &mut Nd21Drive, address: u16, byte: u8) {
     let kept = cell_at(address).map_or(0xFF, |cell| match cell.access {
-        Access::Read => 0xFF,
-        Access::Write | Access::Reserved => cell.read_only_bits,
+        CellAccess::Read => 0xFF,
+        CellAccess::Write | CellAccess::Reserved => cell.read_only_bits,
     });
     let before = drive.program().cells().peek(address);
     drive.program_mut().write(address, byte);

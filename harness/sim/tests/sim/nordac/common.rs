@@ -2,8 +2,8 @@
 
 use harness_proto::nordac::Properties;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::Description;
-use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
+use harness_proto::nordac::properties::NordacProperty;
+use harness_proto::profibus::fdl::{FcFunction, FrameControl, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::{Drive, InverterSetup, Member};
@@ -46,7 +46,7 @@ pub(super) fn setup(address: i32, parameters: &[(u16, i32)]) -> InverterSetup {
 
 /// A property with another value.
 pub(super) fn with(mut setup: InverterSetup, name: &str, word: &str) -> InverterSetup {
-    let property = Description::of(name).expect("a property");
+    let property = NordacProperty::of(name).expect("a property");
     let mut properties: Properties = setup.properties;
     assert!(property.set(&mut properties, word), "{name} = {word}");
     setup.properties = properties;
@@ -139,7 +139,7 @@ impl<D: LineStation> Desk<D> {
     }
 
     /// A new request with the next pdu count bit: `exchange` has no SAPs.
-    fn new_request(&mut self, function: Function, sap: Option<u8>, data: &[u8]) -> String {
+    fn new_request(&mut self, function: FcFunction, sap: Option<u8>, data: &[u8]) -> String {
         if function.is_srd() {
             self.sequence = self.sequence.next();
         }
@@ -162,12 +162,12 @@ impl<D: LineStation> Desk<D> {
 
     /// SRD to a SAP, new.
     pub(super) fn srd(&mut self, sap: u8, data: &str) -> String {
-        self.new_request(Function::SrdHigh, Some(sap), &octets(data))
+        self.new_request(FcFunction::SrdHigh, Some(sap), &octets(data))
     }
 
     /// Data_Exchange, new.
     pub(super) fn exchange(&mut self, data: &str) -> String {
-        self.new_request(Function::SrdHigh, None, &octets(data))
+        self.new_request(FcFunction::SrdHigh, None, &octets(data))
     }
 
     /// The data of the reply to a Data_Exchange, and its FC in front.
@@ -178,7 +178,7 @@ impl<D: LineStation> Desk<D> {
 
     /// Global_Control to the slave.
     pub(super) fn control(&mut self, command: u8, group: u8) -> String {
-        self.new_request(Function::SdnHigh, Some(58), &[command, group])
+        self.new_request(FcFunction::SdnHigh, Some(58), &[command, group])
     }
 
     /// The data of a Slave_Diag.

@@ -10,7 +10,7 @@ use harness_proto::nd21::{bits, ee, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::memory::Memory;
-use harness_proto::novobus::properties::{Properties, Setting};
+use harness_proto::novobus::properties::{BusSetting, Properties};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 use harness_sim::fault::{DriveFault, LinkFault};
@@ -56,7 +56,7 @@ impl Tried for Nd21Drive {
         }
         let mut properties = Nd21Properties::default();
         let deaf = ["answered", "silent"][random.below(2) as usize];
-        assert!(properties.set("self-test-bus", Setting::Word(deaf)));
+        assert!(properties.set("self-test-bus", BusSetting::Word(deaf)));
         let mut drive = Self::new(Properties::default(), properties, eeprom);
         drive.stimulate(Stimulus::Input(Input::Gpin3, true));
         drive.stimulate(Stimulus::Input(Input::Gpin5, random.below(3) > 0));

@@ -4,11 +4,11 @@ use super::common::Member;
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Data;
-use harness_proto::unitek::master::{Event, Job, Options, Outcome};
+use harness_proto::unitek::master::{Job, MasterEvent, Options, Outcome};
 use harness_proto::unitek::properties::Properties;
 use harness_sim::segment::{Host, Segment, Station};
 use harness_sim::unitek::deviation::{
-    DEVIATIONS, Deviant, DeviantMaster, Deviation, MASTER_DEVIATIONS, MasterDeviation,
+    DEVIATIONS, Deviant, DeviantCanMaster, Deviation, MASTER_DEVIATIONS, MasterDeviation,
 };
 use harness_sim::unitek::{Drive, Inputs};
 use std::collections::BTreeSet;
@@ -149,7 +149,7 @@ fn jobs(deviation: Option<&'static MasterDeviation>) -> Left {
         Job::Read { register: 0xE2 },
         long(0x6E, 3_000_000),
     ];
-    let mut master = DeviantMaster::new(0x201, 0x181, Options::default(), deviation);
+    let mut master = DeviantCanMaster::new(0x201, 0x181, Options::default(), deviation);
     let mut segment = Segment::new(
         BitRate::K500,
         vec![Member::Host(Host::default()), Member::Drive(drive())],
@@ -181,7 +181,7 @@ fn jobs(deviation: Option<&'static MasterDeviation>) -> Left {
         }
         let events = std::iter::from_fn(|| master.poll_event());
         outcomes.extend(events.filter_map(|event| match event {
-            Event::Ended { outcome, .. } => Some(outcome),
+            MasterEvent::Ended { outcome, .. } => Some(outcome),
             _ => None,
         }));
     }

@@ -2,13 +2,13 @@
 
 use super::common::Desk;
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::properties::{Description, Properties, Setting};
+use harness_proto::unitek::properties::{Properties, Setting, UnitekProperty};
 use harness_sim::unitek::Inputs;
 
 fn with(name: &str, word: &str) -> Properties {
     let mut properties = Properties::default();
     assert!(
-        Description::of(name)
+        UnitekProperty::of(name)
             .expect("a property of this name")
             .set(&mut properties, Setting::Word(word)),
         "{name}"

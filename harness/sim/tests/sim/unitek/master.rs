@@ -3,8 +3,10 @@
 use super::common::Desk;
 use harness_proto::can::{CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Options, Outcome, Refused};
-use harness_proto::unitek::properties::{Description, Properties, Setting};
+use harness_proto::unitek::master::{
+    CanMaster, Disturbance, Job, JobRefusal, MasterEvent, Options, Outcome,
+};
+use harness_proto::unitek::properties::{Properties, Setting, UnitekProperty};
 use harness_proto::unitek::{Data, Reply};
 use harness_sim::segment::{FrameFault, Placed};
 use harness_sim::unitek::Inputs;
@@ -12,16 +14,16 @@ use harness_sim::unitek::Inputs;
 /// A master at the desk's host.
 struct Bench {
     desk: Desk,
-    master: Master,
+    master: CanMaster,
     now: Instant,
-    events: Vec<Event>,
+    events: Vec<MasterEvent>,
 }
 
 impl Bench {
     fn new(properties: Properties) -> Self {
         Self {
             desk: Desk::with(properties),
-            master: Master::new(0x201, 0x181, Options::default()),
+            master: CanMaster::new(0x201, 0x181, Options::default()),
             now: Instant::START,
             events: Vec::new(),
         }
@@ -56,7 +58,7 @@ impl Bench {
         for _ in 0..10_000 {
             self.run(1);
             let ended = self.events.iter().find_map(|event| match event {
-                Event::Ended { id: ended, outcome } if *ended == id => Some(*outcome),
+                MasterEvent::Ended { id: ended, outcome } if *ended == id => Some(*outcome),
                 _ => None,
             });
             if let Some(outcome) = ended {
@@ -67,8 +69,8 @@ impl Bench {
     }
 
     fn disturbances(&self) -> Vec<Disturbance> {
-        let disturbance = |event: &Event| match event {
-            Event::Disturbance(disturbance) => Some(*disturbance),
+        let disturbance = |event: &MasterEvent| match event {
+            MasterEvent::Disturbance(disturbance) => Some(*disturbance),
             _ => None,
         };
         self.events.iter().filter_map(disturbance).collect()
@@ -165,7 +167,7 @@ fn requests_without_a_reply() {
     }
     let mut silent = Properties::default();
     assert!(
-        Description::of("unknown-register")
+        UnitekProperty::of("unknown-register")
             .unwrap()
             .set(&mut silent, Setting::Word("silent"))
     );
@@ -263,7 +265,7 @@ fn cycles_are_supervised() {
             register: 0x30,
             every: 100
         }),
-        Err(Refused::EightCycles)
+        Err(JobRefusal::EightCycles)
     );
     assert!(
         bench
@@ -280,7 +282,7 @@ fn cycles_are_supervised() {
                 register: 0xE2,
                 every
             }),
-            Err(Refused::Interval)
+            Err(JobRefusal::Interval)
         );
     }
 }
@@ -327,7 +329,7 @@ fn status_by_event() {
     bench.job(write(0x51, 0x10));
     bench.desk.inputs(|inputs| inputs.icns = true);
     bench.run(10);
-    let status = Event::Status {
+    let status = MasterEvent::Status {
         reply: reply(0x40, Data::Long(0x0121)),
     };
     assert!(bench.events.contains(&status), "{:?}", bench.events);
@@ -340,7 +342,7 @@ fn new_identifiers() {
     for (word, rx) in [("immediate", 0x210), ("restart", 0x201)] {
         let mut properties = Properties::default();
         assert!(
-            Description::of("id-change")
+            UnitekProperty::of("id-change")
                 .unwrap()
                 .set(&mut properties, Setting::Word(word))
         );

@@ -8,7 +8,7 @@ use harness_bench::scenario::parse::words::{deviation, equals, named};
 use harness_bench::scenario::problem::Problem;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::times;
-use harness_proto::unitek::properties::{Accepts, Description, PROFILES, PROPERTIES};
+use harness_proto::unitek::properties::{Accepts, PROFILES, PROPERTIES, UnitekProperty};
 use harness_sim::unitek::deviation::DEVIATIONS;
 use harness_sim::unitek::{Control, Inputs};
 
@@ -146,7 +146,7 @@ fn identifiers(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
 /// `map-reply = native`, `homing-time = 20ms`; without `=` as well.
 fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let names = PROPERTIES.iter().map(|property| (property.name, property));
-    let names: Vec<(&str, &'static Description)> = names.collect();
+    let names: Vec<(&str, &'static UnitekProperty)> = names.collect();
     let property = named(scanner, &names, "a property")?;
     scanner.eat("=");
     let value = match property.accepts {

@@ -573,7 +573,7 @@ impl Player {
     }
 
     /// Tells a model's gate what the gate in front of the drives knows of them.
-    fn tell(&self, drives: &[KnownDrives], gate: &mut guard::Gate) {
+    fn tell(&self, drives: &[KnownDrives], gate: &mut guard::FrameGate) {
         for known in drives {
             let [full, limit] = [0xC8, 0x34].map(|register| (known.cell(register) & 0xFFFF) as u16);
             gate.learn(known.axis.rx, full, limit);
@@ -591,7 +591,7 @@ fn outlast(link: &mut Observed<'_>) {
     }
 }
 
-fn differs_between_profiles(property: &harness_proto::unitek::properties::Description) -> bool {
+fn differs_between_profiles(property: &harness_proto::unitek::properties::UnitekProperty) -> bool {
     let profiles = PROFILES.iter().filter_map(|name| Properties::profile(name));
     let values = profiles.map(|profile| property.of_drive(&profile));
     let values: Vec<_> = values.collect();

@@ -1,9 +1,9 @@
 //! Properties that hold for all words, tasks and times (section 13 of the reading).
 
 use super::super::super::property::property;
-use super::{Bench, Inputs, Outputs, State};
+use super::{Bench, InverterInputs, Outputs, State};
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
+use harness_proto::nordac::properties::{Choices, NordacProperty, PROPERTIES, Properties};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{PARAMETERS, Pkw, PpoType};
 use harness_proto::time::Span;
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 /// What happens to an inverter.
 #[derive(Clone, Debug)]
-enum Step {
+enum InverterStep {
     Words(Outputs),
     Task(Pkw),
     Wait(u64),
@@ -66,15 +66,15 @@ fn time() -> impl Strategy<Value = u64> {
     ]
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> impl Strategy<Value = InverterStep> {
     prop_oneof![
-        8 => words().prop_map(Step::Words),
-        4 => task().prop_map(Step::Task),
-        6 => time().prop_map(Step::Wait),
-        1 => prop::option::of(1..=25_u8).prop_map(Step::Cause),
-        1 => any::<bool>().prop_map(Step::Link),
-        1 => Just(Step::Watchdog),
-        1 => Just(Step::PowerUp),
+        8 => words().prop_map(InverterStep::Words),
+        4 => task().prop_map(InverterStep::Task),
+        6 => time().prop_map(InverterStep::Wait),
+        1 => prop::option::of(1..=25_u8).prop_map(InverterStep::Cause),
+        1 => any::<bool>().prop_map(InverterStep::Link),
+        1 => Just(InverterStep::Watchdog),
+        1 => Just(InverterStep::PowerUp),
     ]
 }
 
@@ -93,18 +93,18 @@ fn open() -> impl Strategy<Value = Properties> {
     })
 }
 
-fn set_any(property: &Description, index: prop::sample::Index, properties: &mut Properties) {
-    if let Accepts::Words(words) = property.accepts {
+fn set_any(property: &NordacProperty, index: prop::sample::Index, properties: &mut Properties) {
+    if let Choices::Words(words) = property.accepts {
         assert!(property.set(properties, words[index.index(words.len())]));
     }
 }
 
 impl Bench {
-    fn step(&mut self, step: &Step, cut: u64) {
+    fn step(&mut self, step: &InverterStep, cut: u64) {
         match *step {
-            Step::Words(outputs) => self.inverter.take(self.now, &outputs),
-            Step::Task(task) => _ = self.inverter.task(self.now, task, PpoType::Two),
-            Step::Wait(units) => {
+            InverterStep::Words(outputs) => self.inverter.take(self.now, &outputs),
+            InverterStep::Task(task) => _ = self.inverter.task(self.now, task, PpoType::Two),
+            InverterStep::Wait(units) => {
                 // The same time in pieces.
                 let part = units / (cut + 1);
                 for _ in 0..cut {
@@ -115,23 +115,23 @@ impl Bench {
                 self.now += Span::from_units(units - part * cut);
                 self.inverter.advance(self.now);
             }
-            Step::Cause(code) => self.inverter.set_cause(self.now, code),
-            Step::Link(true) => self.inverter.link_found(self.now),
-            Step::Link(false) => self.inverter.link_lost(self.now),
-            Step::Watchdog => self.inverter.watchdog_expired(self.now),
-            Step::PowerUp => self.inverter.power_up(self.now),
+            InverterStep::Cause(code) => self.inverter.set_cause(self.now, code),
+            InverterStep::Link(true) => self.inverter.link_found(self.now),
+            InverterStep::Link(false) => self.inverter.link_lost(self.now),
+            InverterStep::Watchdog => self.inverter.watchdog_expired(self.now),
+            InverterStep::PowerUp => self.inverter.power_up(self.now),
         }
     }
 
     /// Everything that a master or a scenario can see.
-    fn seen(&self) -> (Inputs, State, Vec<Option<i64>>) {
+    fn seen(&self) -> (InverterInputs, State, Vec<Option<i64>>) {
         let all = PARAMETERS.iter();
         let values = all.map(|parameter| self.inverter.parameter(parameter, Index::default()));
         (self.inputs(), self.state(), values.collect())
     }
 }
 
-fn steps(most: usize) -> impl Strategy<Value = Vec<Step>> {
+fn steps(most: usize) -> impl Strategy<Value = Vec<InverterStep>> {
     prop::collection::vec(step(), 0..most)
 }
 
@@ -192,7 +192,8 @@ fn no_task_switches_the_output_on() {
             let before = bench.state();
             bench.step(step, 0);
             let switched = !before.output_on() && bench.state().output_on();
-            let by_words = matches!(step, Step::Words(outputs) if outputs.stw & stw::VALID != 0);
+            let by_words =
+                matches!(step, InverterStep::Words(outputs) if outputs.stw & stw::VALID != 0);
             assert!(!switched || by_words, "{step:?}");
             assert!(bench.state().output_on() || bench.actual() == 0);
         }
@@ -210,8 +211,8 @@ fn the_actual_value_stays_within_100_percent() {
             let mut bench = Bench::new(&[(1621, interface), (1504, 1), (1509, 999)]);
             for (outputs, units) in steps {
                 let stw = outputs.stw & 0x3FFF;
-                bench.step(&Step::Words(Outputs { stw, ..outputs }), 0);
-                bench.step(&Step::Wait(units), 3);
+                bench.step(&InverterStep::Words(Outputs { stw, ..outputs }), 0);
+                bench.step(&InverterStep::Wait(units), 3);
                 assert!(bench.actual().cast_signed().unsigned_abs() <= 0x4000);
             }
         },
@@ -251,11 +252,11 @@ fn no_start_without_the_sequence() {
                 break;
             }
             prepared |= valid && outputs.stw & 7 == 6;
-            bench.step(&Step::Words(outputs), 0);
+            bench.step(&InverterStep::Words(outputs), 0);
             if task.number() != 1621 {
-                bench.step(&Step::Task(task), 0);
+                bench.step(&InverterStep::Task(task), 0);
             }
-            bench.step(&Step::Wait(units), 0);
+            bench.step(&InverterStep::Wait(units), 0);
             assert_eq!(bench.actual(), 0);
         }
     });

@@ -236,13 +236,13 @@ fn status_bits_4_and_5_before_the_first_word() {
 }
 
 /// Property, value, and tasks with their answers, one after the other.
-type Channel = (
+type ChannelCase = (
     &'static str,
     &'static str,
     &'static [(&'static str, &'static str)],
 );
 
-const CHANNEL: [Channel; 28] = [
+const CHANNEL: [ChannelCase; 28] = [
     (
         "address-range",
         "1..126",

@@ -1,6 +1,6 @@
 //! A master that deviates.
 
-use super::how::{How, MasterDeviation, Notes, ReturnedByte, Sending};
+use super::how::{How, MasterDeviation, MasterNotes, ReturnedByte, Sending};
 use super::speech::{SentByte, Speech, What};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
@@ -35,7 +35,7 @@ pub struct DeviantMaster {
     flown: VecDeque<(SentByte, bool)>,
     /// The sums of the answers begun.
     answers: BTreeMap<u8, Checksum>,
-    notes: Notes,
+    notes: MasterNotes,
 }
 
 impl DeviantMaster {
@@ -59,7 +59,7 @@ impl DeviantMaster {
             speech: Speech::new(ring.drives(), options.read_long),
             flown: VecDeque::new(),
             answers: BTreeMap::new(),
-            notes: Notes {
+            notes: MasterNotes {
                 ring,
                 open: Vec::new(),
                 told: Vec::new(),

@@ -5,7 +5,7 @@ use super::table::DEVIATIONS;
 use crate::deviation::{Deviation, DeviationTable};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{Data, Event, Job, JobId, MasterOptions, Phase};
+use harness_proto::novobus::master::{Event, Job, JobId, MasterOptions, Phase, ReadData};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 
@@ -51,16 +51,16 @@ impl ReturnedByte {
 
 /// What a wrong master keeps in mind.
 #[derive(Clone, Debug)]
-pub(super) struct Notes {
+pub(super) struct MasterNotes {
     pub(super) ring: RingSize,
     /// Jobs that have not ended.
     pub(super) open: Vec<(JobId, Job)>,
     /// Jobs whose end is not reported any more.
     pub(super) told: Vec<JobId>,
     /// What the last read brought.
-    pub(super) last: Option<Data>,
+    pub(super) last: Option<ReadData>,
     /// A result that is held back.
-    pub(super) held: Option<(JobId, Data)>,
+    pub(super) held: Option<(JobId, ReadData)>,
     /// Events to report next.
     pub(super) queue: VecDeque<Event>,
 }
@@ -83,9 +83,9 @@ pub(super) enum How {
     /// It does what it is given twice, where this says so.
     Doubles(fn(&Job) -> bool),
     /// It tells something as soon as it has taken a job.
-    Takes(fn(&mut Notes, JobId, &Job)),
+    Takes(fn(&mut MasterNotes, JobId, &Job)),
     /// It tells something else.
-    Tells(fn(&mut Notes, Event) -> Option<Event>),
+    Tells(fn(&mut MasterNotes, Event) -> Option<Event>),
     /// It gives the drives other nominal values.
     Nominal(fn(u16) -> u16),
     /// It gives the actual value of another drive.

@@ -48,7 +48,7 @@ pub(super) struct SentByte {
 
 /// A command begun.
 #[derive(Clone, Copy, Debug)]
-struct PartialCommand {
+struct BegunCommand {
     layout: &'static Layout,
     taken: usize,
     sum: Checksum,
@@ -64,7 +64,7 @@ pub(super) struct Speech {
     address_next: bool,
     drive: Option<u8>,
     drive_before: Option<u8>,
-    begun: BTreeMap<u8, PartialCommand>,
+    begun: BTreeMap<u8, BegunCommand>,
     sequence: u8,
     after_sequence: bool,
 }
@@ -158,7 +158,7 @@ impl Speech {
         };
         let Some(begun) = self.begun.get_mut(&drive) else {
             if let Some(layout) = layout(byte, self.read_long) {
-                let begun = PartialCommand {
+                let begun = BegunCommand {
                     layout,
                     taken: 0,
                     sum: Checksum::EMPTY.with(byte),

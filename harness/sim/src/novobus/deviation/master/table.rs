@@ -1,12 +1,12 @@
 //! The table of wrong masters (ND21 8, 9, 10, 11).
 
-use super::how::{Due, How, MasterDeviation, MasterInjection, Notes, Sending};
+use super::how::{Due, How, MasterDeviation, MasterInjection, MasterNotes, Sending};
 use super::speech::{SentByte, What};
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, Field, Reply};
 use harness_proto::novobus::master::{
-    Data, Event, Fault, Job, JobId, LinkEnd, MasterOptions, Outcome, Phase, Repeat, RingLink,
+    Event, Fault, Job, JobId, LinkEnd, MasterOptions, Outcome, Phase, ReadData, Repeat, RingLink,
 };
 use harness_proto::novobus::sync::{Addressing, SYNCO};
 
@@ -450,7 +450,7 @@ fn renamed(event: Event, link: impl Fn(u8) -> RingLink) -> Event {
     Event::Disturbed { fault, attempt }
 }
 
-fn failed_as_read(_: &mut Notes, event: Event) -> Option<Event> {
+fn failed_as_read(_: &mut MasterNotes, event: Event) -> Option<Event> {
     // A failed write is reported as an empty read, so that a job of either kind has a result.
     let Event::Ended {
         id,
@@ -459,11 +459,11 @@ fn failed_as_read(_: &mut Notes, event: Event) -> Option<Event> {
     else {
         return Some(event);
     };
-    let outcome = Outcome::Read(Data::default());
+    let outcome = Outcome::Read(ReadData::default());
     Some(Event::Ended { id, outcome })
 }
 
-fn exchange_results(notes: &mut Notes, event: Event) -> Option<Event> {
+fn exchange_results(notes: &mut MasterNotes, event: Event) -> Option<Event> {
     let Event::Ended {
         id,
         outcome: Outcome::Read(data),
