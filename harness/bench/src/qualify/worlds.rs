@@ -293,15 +293,25 @@ pub fn judge_alive<M: RightDrive>(
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
 ) -> WorldsVerdict<M::Piece> {
-    // Drives of different kinds are never merged: each is judged by itself.
+    judge_kinds(drives, |drive| match lost(drive, talk, alive) {
+        Ok(_) => WorldsVerdict::Right,
+        Err((verdict, _)) => verdict,
+    })
+}
+
+/// Judges worlds of several kinds, which are never merged, each by itself: what came is right if one of them could have sent it, and not decided
+/// if one of them is not. Else the judgement is that on the first one.
+pub fn judge_kinds<W, P>(
+    worlds: impl IntoIterator<Item = W>,
+    mut judged: impl FnMut(W) -> WorldsVerdict<P>,
+) -> WorldsVerdict<P> {
     let mut first = None;
-    for drive in drives {
-        match lost(drive, talk, alive) {
-            Err((WorldsVerdict::Wrong(place, expected), _)) => {
+    for world in worlds {
+        match judged(world) {
+            WorldsVerdict::Wrong(place, expected) => {
                 first.get_or_insert(WorldsVerdict::Wrong(place, expected));
             }
-            Err((other, _)) => return other,
-            Ok(_) => return WorldsVerdict::Right,
+            decided => return decided,
         }
     }
     first.unwrap_or(WorldsVerdict::Unknown)

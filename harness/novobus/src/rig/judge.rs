@@ -6,7 +6,7 @@ use crate::language::plan::Plan;
 use crate::language::syntax::{DriveRange, Header, Setup};
 use crate::rig::run::{Way, play_one, twin};
 use crate::twin::{
-    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, UnaskedByte,
+    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, TOO_MANY, UnaskedByte,
 };
 use harness_bench::link::{LinkEvent, Recording};
 use harness_bench::rig::check::Rig;
@@ -143,7 +143,9 @@ fn diverged(
             }
             None if silenced(facts.comparisons) => {
                 late(outcome);
-                outcome.remarks.push(SILENCED.to_owned());
+                let too_many = facts.comparisons.iter().any(|result| result.too_many);
+                let why = if too_many { TOO_MANY } else { SILENCED };
+                outcome.remarks.push(why.to_owned());
             }
             None => outcome.verdict = Verdict::Failed,
         },

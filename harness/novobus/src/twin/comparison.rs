@@ -223,6 +223,8 @@ pub(crate) struct Comparison {
     /// In real time, whether the bench was silent or late in front of that byte, so that drives that monitor time-outs may have missed their
     /// bytes (ND21 9.9).
     pub silenced: bool,
+    /// Whether that is so because there are more places than are tried at which bytes may have been held back.
+    pub too_many: bool,
     /// In real time, the first byte of each ring that a drive sent unasked. The bytes after it are a race of clocks: only properties that
     /// hold for every order are compared, up to a check sequence that ends it.
     pub unasked: Vec<UnaskedByte>,

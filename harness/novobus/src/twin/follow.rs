@@ -8,6 +8,7 @@ use super::unasked::EARLIEST_TIME_OUT;
 use crate::link::BesideTheBus;
 use crate::link::SimulatedLink;
 use harness_bench::link::{Line, Link, LinkEvent, Moment, Octets, PlacedFault};
+use harness_bench::qualify::worlds::{WorldsVerdict, judge_kinds};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
@@ -259,37 +260,42 @@ impl Twin {
                     .map(|race| race.at),
             };
             let (heard, more) = ring.held_back(conversation, found);
-            let monitored = comparison.monitored;
-            comparison.silenced = before.with_monitors(found.ring, monitored, |twin| {
-                let explained = heard.iter().any(|heard| {
-                    let mut twin = twin.clone();
-                    twin.rest(found.ring, heard.rest);
-                    let comparison = twin.compare(&heard.conversation, exactness, left_out);
-                    comparison.divergence.is_none() && ring.is_in_error(conversation, &comparison)
-                });
-                explained || more
+            let twins = before.with_monitors(found.ring, comparison.monitored);
+            let worlds =
+                twins.flat_map(|twin| heard.iter().map(move |heard| (twin.clone(), heard)));
+            let verdict = judge_kinds(worlds, |(mut twin, heard)| {
+                twin.rest(found.ring, heard.rest);
+                let again = twin.compare(&heard.conversation, exactness, left_out);
+                match again.divergence.is_none() && ring.is_in_error(conversation, &again) {
+                    true => WorldsVerdict::Right,
+                    false => WorldsVerdict::Wrong(found.byte, found.expected),
+                }
             });
+            let explained = verdict == WorldsVerdict::Right;
+            comparison.too_many = more && !explained;
+            comparison.silenced = more || explained;
         }
         comparison
     }
 
-    /// Whether something holds for a twin in which drives of a ring monitor time-outs (ND21 14.10.2): those of the model, if one has
-    /// `monitored`; all of which it is not known; or one of these.
-    fn with_monitors(&self, ring: usize, monitored: bool, holds: impl Fn(&Self) -> bool) -> bool {
+    /// This twin with drives of a ring that monitor time-outs (ND21 14.10.2): those of the model, if one has `monitored`; all of which it is not
+    /// known; and each one of these.
+    fn with_monitors(&self, ring: usize, monitored: bool) -> impl Iterator<Item = Self> {
         let drives = 0..self.sizes[ring].drives();
         let is_unknown = |drive: &u8| self.knowledge.monitors(ring, *drive).is_none();
         let unknown: Vec<_> = drives.filter(is_unknown).collect();
-        let alone = unknown
-            .chunks(1)
-            .filter(|_| (2..=SMALL).contains(&unknown.len()));
-        let mut some = std::iter::once(&unknown[..]).chain(alone);
-        monitored && holds(self)
-            || some.any(|drives| {
-                let mut twin = self.clone();
-                let monitor = |drive: &u8| twin.link.monitor(ring, *drive);
-                drives.iter().for_each(monitor);
-                !drives.is_empty() && holds(&twin)
-            })
+        let alone = (2..=SMALL).contains(&unknown.len());
+        let alone = unknown.iter().filter(|_| alone).map(|drive| vec![*drive]);
+        let alone: Vec<_> = alone.collect();
+        let known = monitored.then(Vec::new);
+        let all = (!unknown.is_empty()).then_some(unknown);
+        let drives = known.into_iter().chain(all).chain(alone);
+        drives.map(move |drives| {
+            let mut twin = self.clone();
+            let monitor = |drive: &u8| twin.link.monitor(ring, *drive);
+            drives.iter().for_each(monitor);
+            twin
+        })
     }
 
     /// Lets a silence pass. Drives monitor from the first byte on that they hear (ND21 9.9).

@@ -24,4 +24,4 @@ pub(crate) use follow::{Conversation, Done, Silences, Twin};
 #[cfg(test)]
 pub(crate) use harness_proto::novobus::role::Role;
 pub(crate) use places::{answered, answering, what_of};
-pub(crate) use silence::SILENCED;
+pub(crate) use silence::{SILENCED, TOO_MANY};

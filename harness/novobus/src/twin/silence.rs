@@ -16,6 +16,10 @@ use harness_proto::time::{Instant, Span};
 pub(crate) const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
     (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
 
+/// Why a difference is not decided where there are more than [`MOST_PLACES`].
+pub(crate) const TOO_MANY: &str = "not decided: there are more than 32 places before the first byte that differs at which the computer or the line may have held bytes back, and \
+    drives that monitor time-outs miss their bytes then (ND21 9.9); run it again on a computer with less load";
+
 /// Maximum time by which a byte is earlier over a socket that keeps a line's times than on a line.
 pub(super) const EARLY: Span = Span::from_millis(1);
 
@@ -207,4 +211,51 @@ fn is_other((_, heard): &(Instant, Received), size: RingSize) -> bool {
 fn is_check_sequence(bytes: &[(Instant, Received)]) -> bool {
     let bytes = bytes.iter().map(|(_, byte)| *byte);
     bytes.eq(SEQUENCE.map(Received::good))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::comparison::Symptom;
+    use super::*;
+    use harness_proto::novobus::role::Role;
+
+    /// Zeros, each sent 12 ms after the one before and back at once: before each of them the drives may have missed their master.
+    #[test]
+    fn places_beyond_the_bound_are_told() {
+        let size = RingSize::new(3).expect("a ring");
+        let more = |zeros: u64| {
+            let at = |byte: u64| Instant::START + Span::from_millis(12 * byte);
+            let way = Span::from_millis(2);
+            let sent = |byte: u64| (0, Done::Sent(at(byte), 0));
+            let came = |byte: u64| (0, at(byte) + way, Received::good(0));
+            let conversation = Conversation {
+                done: (0..zeros).map(sent).collect(),
+                received: (0..zeros).map(came).collect(),
+                ..Conversation::default()
+            };
+            let ring = SeenRing {
+                ring: 0,
+                size,
+                byte_time: Span::from_micros(286),
+                earliest: Span::from_millis(10),
+                after_a_race: None,
+                race: None,
+            };
+            let found = Divergence {
+                ring: 0,
+                byte: usize::try_from(zeros).expect("few"),
+                what: Symptom::Value,
+                expected: None,
+                received: None,
+                role: Role::Idle,
+                rule: ("9.9", ""),
+                step: None,
+                drive: None,
+            };
+            ring.held_back(&conversation, &found).1
+        };
+        assert!(!more(MOST_PLACES as u64));
+        assert!(more(MOST_PLACES as u64 + 2));
+        assert!(TOO_MANY.contains(&format!("more than {MOST_PLACES} places")));
+    }
 }
