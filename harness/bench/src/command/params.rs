@@ -135,11 +135,10 @@ fn load<D: CommandDrives>(
     on(bench, &params.rig, as_what, output, |session, output| {
         let drive = single(&params.drive, session)?;
         let mut orders = differing::<D>(session, drive, &wanted, output)?;
-        if !yes {
-            output.say("nothing was written; --yes writes it\n");
-            return Ok(Exit::Passed);
-        }
         let all = orders.len();
+        if let Some(exit) = unwritten(&D::named(&[drive]), all, arguments, output)? {
+            return Ok(exit);
+        }
         orders.retain(D::PARAMETERS.is_loaded);
         (D::PARAMETERS.write)(session, drive, &orders, arguments.store)?;
         let kept = all - orders.len();
@@ -154,6 +153,34 @@ fn load<D: CommandDrives>(
             _ => Exit::Failed,
         })
     })
+}
+
+/// The exit code of a load that has nothing to write; `None` where it goes on.
+///
+/// # Errors
+/// `--yes` is missing: nothing is written.
+pub fn unwritten(
+    named: &str,
+    count: usize,
+    arguments: &LoadArguments,
+    output: &mut Output,
+) -> Result<Option<Exit>, Failure> {
+    if count == 0 && !arguments.store {
+        output.result(&format!("{named}: nothing to change\n"))?;
+        return Ok(Some(Exit::Passed));
+    }
+    if arguments.yes {
+        return Ok(None);
+    }
+    let store = if arguments.store {
+        ", and the EEPROM"
+    } else {
+        ""
+    };
+    Err(Failure::refused(format!(
+        "{named}: {} would change{store}; nothing was written, add --yes to write",
+        counted(count, "parameter")
+    )))
 }
 
 /// Shows the parameters that differ from those of a file, and returns them.

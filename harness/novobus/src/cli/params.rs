@@ -11,6 +11,7 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::file;
 use harness_bench::command::output::Output;
+use harness_bench::command::params::unwritten;
 use harness_bench::command::rig_name::Use;
 use harness_bench::counted::counted;
 use harness_bench::rig::state::utc;
@@ -191,21 +192,9 @@ fn load(
         output.result(&format!("{name}: {held} -> {wanted}\n"))?;
         changes.push(entry);
     }
-    if changes.is_empty() && !arguments.store {
-        output.result(&format!("drive {axis}: nothing to change\n"))?;
-        return Ok(Exit::Passed);
-    }
     let count = changes.len();
-    if !arguments.yes {
-        let store = if arguments.store {
-            ", and the EEPROM"
-        } else {
-            ""
-        };
-        return Err(Failure::refused(format!(
-            "drive {axis}: {} would change{store}; nothing was written, add --yes to write",
-            counted(count, "parameter")
-        )));
+    if let Some(exit) = unwritten(&axes::named(&[axis]), count, arguments, output)? {
+        return Ok(exit);
     }
     let mode = bench.bus.state(axis)?.mode();
     if mode == "go" {
