@@ -113,7 +113,7 @@ impl<C: PlayedCase> CampaignResult<C> {
         let disturbed = worst.first()?.disturbed().is_some();
         let mut html = Html::new();
         html.element("table", &[], |html| {
-            let caption = "The gravest cases, each with what plays it again";
+            let caption = "The most serious cases, each with the command that plays it again";
             html.line("caption", &[], caption);
             let mut heads = vec!["Class", "Case", "What happened", "Reproduce with"];
             if disturbed {
